@@ -1,0 +1,1 @@
+//! Files to heads and back.

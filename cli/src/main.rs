@@ -1,0 +1,2 @@
+//! The `rubor` command.
+fn main() {}

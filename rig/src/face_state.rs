@@ -1,0 +1,36 @@
+//! The state of a face at one moment: all that the renderer needs beside the head itself.
+
+use glam::{Quat, Vec3};
+
+use crate::head::Head;
+
+/// Weights of one moment, resolved against one head. Names are gone: everything is an index into the head.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceState {
+    /// Weight of each of [`Head::shapes`], combinations and in-betweens included.
+    pub shapes: Vec<f32>,
+    /// Weight of each of `maps.zones`, 0 to 1: already summed over expressions and clamped (papers/004 section 8.2).
+    pub zones: Vec<f32>,
+    /// Weight of each of `maps.distributions`; the neutral distribution has the rest, `1 - sum`.
+    pub distributions: Vec<f32>,
+    /// Global factor of hemoglobin (papers/004 section 7.7: 1.27 for anger, 0.81 for fear); 1 is neutral.
+    pub hemoglobin_scale: f32,
+    /// Rotation of the head about `head_pivot`.
+    pub head_rotation: Quat,
+    /// Translation after the rotation, metres.
+    pub head_translation: Vec3,
+}
+
+impl FaceState {
+    /// The neutral face of a head.
+    pub fn neutral(head: &Head) -> Self {
+        Self {
+            shapes: vec![0.0; head.shapes.len()],
+            zones: vec![0.0; head.maps.zones.len()],
+            distributions: vec![0.0; head.maps.distributions.len()],
+            hemoglobin_scale: 1.0,
+            head_rotation: Quat::IDENTITY,
+            head_translation: Vec3::ZERO,
+        }
+    }
+}
