@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
+use super::numerics::erf;
 use crate::error::SkinError;
 
 /// One term `weight * G(variance, r)`, `G(v, r) = exp(-r^2 / (2 v)) / (2 pi v)` (d'Eon, Luebke and Enderton 2007).
@@ -68,6 +69,12 @@ impl GaussianSum {
     pub fn mass_beyond(&self, r_mm: f64) -> f64 {
         let r2 = r_mm * r_mm;
         self.terms.iter().map(|t| t.weight * (-r2 / (2.0 * t.variance_mm2)).exp()).sum()
+    }
+
+    /// Fraction of the light with `|x| < x_mm`, `sum_i w_i erf(x / sqrt(2 v_i))` over the total.
+    pub fn line_cdf(&self, x_mm: f64) -> f64 {
+        let term = |t: &GaussianTerm| t.weight * erf(x_mm / (2.0 * t.variance_mm2).sqrt());
+        self.terms.iter().map(term).sum::<f64>() / self.total()
     }
 
     /// T(s) as printed in Jimenez 2012, eq. 5.12: `sum_i w_i exp(-s^2 / v_i)`.

@@ -20,7 +20,11 @@
 //! assert!((red - 1.0).abs() < 1e-12);
 //! ```
 
+pub mod diffusion;
 pub mod gaussians;
 pub mod kernel;
+pub mod medium;
+pub mod monte_carlo;
 pub(crate) mod numerics;
 pub mod profile;
+pub mod table;

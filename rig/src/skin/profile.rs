@@ -9,8 +9,12 @@ use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 
+use super::diffusion::{
+    BetterDipole, ExponentialSum, MultipoleSlab, NormalizedDiffusion, PhotonBeamDiffusion, StandardDipole,
+};
 use super::gaussians::{DEON_SIX, GaussianSum, GaussianTerm, JIMENEZ_FOUR};
 use super::numerics::{gauss_legendre, integrate, invert_cdf};
+use super::table::RadialTable;
 
 /// Eight nodes for a panel over which an integrand is smooth.
 static PANEL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(8));
@@ -21,34 +25,66 @@ static PANEL_RULE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(8
 pub enum RadialProfile {
     /// A sum of Gaussians.
     Gaussians(GaussianSum),
+    /// Standard dipole.
+    StandardDipole(StandardDipole),
+    /// Better dipole.
+    BetterDipole(BetterDipole),
+    /// A slab's reflectance or transmittance.
+    MultipoleSlab(MultipoleSlab),
+    /// Normalized diffusion.
+    NormalizedDiffusion(NormalizedDiffusion),
+    /// Photon beam diffusion.
+    PhotonBeamDiffusion(PhotonBeamDiffusion),
+    /// A sum of exponentials over r.
+    Exponentials(ExponentialSum),
+    /// A table, such as a photon walk's.
+    Tabulated(RadialTable),
+}
+
+/// The same expression for the value inside of every variant.
+macro_rules! each {
+    ($self:expr, $p:ident => $body:expr) => {
+        match $self {
+            RadialProfile::Gaussians($p) => $body,
+            RadialProfile::StandardDipole($p) => $body,
+            RadialProfile::BetterDipole($p) => $body,
+            RadialProfile::MultipoleSlab($p) => $body,
+            RadialProfile::NormalizedDiffusion($p) => $body,
+            RadialProfile::Exponentials($p) => $body,
+            RadialProfile::PhotonBeamDiffusion(beam) => {
+                let $p = beam.table();
+                $body
+            }
+            RadialProfile::Tabulated($p) => $body,
+        }
+    };
 }
 
 impl RadialProfile {
-    /// R(r) in mm^-2, `r_mm >= 0`.
+    /// R(r) in mm^-2, `r_mm >= 0`. Normalized diffusion and sums of exponentials are infinite at 0, tables may be.
     pub fn reflectance(&self, r_mm: f64) -> f64 {
-        match self {
-            Self::Gaussians(p) => p.reflectance(r_mm),
-        }
+        each!(self, p => p.reflectance(r_mm))
     }
 
-    /// Total diffuse reflectance: the integral of R over the plane.
+    /// Total diffuse reflectance: the integral of R over the plane, in closed form for all but tables (exact for the
+    /// table's own power laws).
     pub fn total(&self) -> f64 {
-        match self {
-            Self::Gaussians(p) => p.total(),
-        }
+        self.mass_beyond(0.0)
     }
 
-    /// Integral of R outside of a disk of radius `r_mm`.
+    /// Integral of R outside of a disk of radius `r_mm`; closed form as the total is.
     pub fn mass_beyond(&self, r_mm: f64) -> f64 {
-        match self {
-            Self::Gaussians(p) => p.mass_beyond(r_mm),
-        }
+        each!(self, p => p.mass_beyond(r_mm))
     }
 
-    /// A radius of the order of the profile's width, where numerical searches start.
-    pub fn scale_mm(&self) -> f64 {
+    /// A radius inside of the profile, where numerical searches start.
+    pub(crate) fn scale_mm(&self) -> f64 {
         match self {
             Self::Gaussians(p) => p.terms()[0].variance_mm2.sqrt(),
+            Self::NormalizedDiffusion(p) => p.d_mm,
+            Self::Exponentials(p) => p.terms()[0].length_mm,
+            // Tables and models of a medium: any power of two near a millimetre is reached by doubling or halving.
+            _ => 0.125,
         }
     }
 
@@ -59,7 +95,10 @@ impl RadialProfile {
 
     /// The radius inside of which the fraction `u` of the light returns: a uniform `u` samples `2 pi r R(r)`.
     pub fn sample_radius(&self, u: f64) -> f64 {
-        invert_cdf(u, self.scale_mm(), |r| self.cdf(r))
+        match self {
+            Self::NormalizedDiffusion(p) => p.sample_radius(u),
+            _ => invert_cdf(u, self.scale_mm(), |r| self.cdf(r)),
+        }
     }
 
     /// Light through a slab of thickness `s_mm` under uniform irradiance: the integral of `R(sqrt(r^2 + s^2))` over
@@ -76,6 +115,9 @@ impl RadialProfile {
     pub fn line_cdf(&self, x_mm: f64) -> f64 {
         if x_mm <= 0.0 {
             return 0.0;
+        }
+        if let Self::Gaussians(p) = self {
+            return p.line_cdf(x_mm);
         }
         (1.0 - self.wedge_beyond(x_mm, f64::INFINITY) / (FRAC_PI_2 * self.total())).clamp(0.0, 1.0)
     }
@@ -174,17 +216,13 @@ mod tests {
 
     #[test]
     fn line_and_quadrant_agree_with_the_error_function() {
-        let profile = Profile::deon_six();
-        let RadialProfile::Gaussians(sum) = &profile.channels[0] else { unreachable!() };
-        let line = |x: f64| -> f64 {
-            let term =
-                |t: &GaussianTerm| t.weight * super::super::numerics::erf(x / (2.0 * t.variance_mm2).sqrt());
-            sum.terms().iter().map(term).sum()
-        };
-        for x in [0.01, 0.2, 1.0, 4.0] {
-            assert!((profile.channels[0].line_cdf(x) - line(x)).abs() < 1e-10, "{x}");
-            let far = profile.channels[0].quadrant_cdf(x, 1e3);
-            assert!((far - line(x) / 4.0).abs() < 1e-9, "{x}: {far} {}", line(x) / 4.0);
+        let channel = &Profile::deon_six().channels[0];
+        for x in [0.001, 0.01, 0.2, 1.0, 4.0] {
+            let exact = channel.line_cdf(x);
+            let generic = 1.0 - channel.wedge_beyond(x, f64::INFINITY) / FRAC_PI_2;
+            assert!((generic - exact).abs() < 1e-9, "{x}: {generic} {exact}");
+            let far = channel.quadrant_cdf(x, 1e3);
+            assert!((far - exact / 4.0).abs() < 1e-9, "{x}: {far} {exact}");
         }
     }
 
