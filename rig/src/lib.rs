@@ -24,3 +24,4 @@ pub mod face_state;
 pub mod head;
 pub mod landmarks;
 pub mod map;
+pub mod skin;

@@ -1,0 +1,30 @@
+//! Light in skin: how far it travels before it comes out again.
+//!
+//! ```text
+//! Medium (sigma_s', sigma_a, eta) --> dipoles, multipole, photon beam diffusion --+
+//!            |                                                                    +--> Profile (R, G, B)
+//!            +--> photon walk --> radial table --> fits -------------------------+        |
+//! measured sums of Gaussians ---------------------------------------------------+         +--> sum of Gaussians
+//!                                                                                          +--> separable kernel
+//!                                                                                          +--> T(s) look-up
+//! ```
+//!
+//! Lengths are millimetres, coefficients are per millimetre, everything is f64.
+//!
+//! ```
+//! use rubor_rig::skin::kernel::SeparableKernel;
+//! use rubor_rig::skin::profile::Profile;
+//!
+//! let kernel = SeparableKernel::of(&Profile::deon_six(), 17).unwrap();
+//! let red: f64 = kernel.weights.iter().map(|w| w[0]).sum();
+//! assert!((red - 1.0).abs() < 1e-12);
+//! ```
+
+pub mod diffusion;
+pub mod gaussians;
+pub mod kernel;
+pub mod medium;
+pub mod monte_carlo;
+pub(crate) mod numerics;
+pub mod profile;
+pub mod table;
