@@ -127,10 +127,8 @@ impl EnvironmentMap {
             let w = self.solid_angle(y);
             for x in 0..self.width {
                 let l = w * self.texels[(y * self.width + x) as usize];
-                let d = direction(
-                    (x as f32 + 0.5) / self.width as f32,
-                    (y as f32 + 0.5) / self.height as f32,
-                );
+                let d =
+                    direction((x as f32 + 0.5) / self.width as f32, (y as f32 + 0.5) / self.height as f32);
                 for (c, b) in c.iter_mut().zip(basis(d)) {
                     *c += b * l;
                 }
@@ -156,7 +154,8 @@ impl EnvironmentMap {
                 map.texels.iter().map(|t| t.extend(1.0).to_array()).collect()
             })
             .collect();
-        let filtered = texture::upload_half(gpu, "environment", [FILTERED_WIDTH, FILTERED_WIDTH / 2], &[levels]);
+        let filtered =
+            texture::upload_half(gpu, "environment", [FILTERED_WIDTH, FILTERED_WIDTH / 2], &[levels]);
         let harmonics = self.resized(64, 32).irradiance_harmonics().map(|c| c.extend(0.0).to_array());
         Environment { filtered, levels: LEVELS, harmonics }
     }
@@ -167,10 +166,8 @@ impl EnvironmentMap {
         let directions: Vec<(Vec3, f32, Vec3)> = (0..self.height)
             .flat_map(|y| (0..self.width).map(move |x| (x, y)))
             .map(|(x, y)| {
-                let d = direction(
-                    (x as f32 + 0.5) / self.width as f32,
-                    (y as f32 + 0.5) / self.height as f32,
-                );
+                let d =
+                    direction((x as f32 + 0.5) / self.width as f32, (y as f32 + 0.5) / self.height as f32);
                 (d, self.solid_angle(y), self.texels[(y * self.width + x) as usize])
             })
             .collect();
@@ -194,17 +191,7 @@ impl EnvironmentMap {
 
 /// The polynomials of the shader, without normalisation.
 fn basis(d: Vec3) -> [f32; 9] {
-    [
-        1.0,
-        d.y,
-        d.z,
-        d.x,
-        d.x * d.y,
-        d.y * d.z,
-        3.0 * d.z * d.z - 1.0,
-        d.x * d.z,
-        d.x * d.x - d.y * d.y,
-    ]
+    [1.0, d.y, d.z, d.x, d.x * d.y, d.y * d.z, 3.0 * d.z * d.z - 1.0, d.x * d.z, d.x * d.x - d.y * d.y]
 }
 
 #[cfg(test)]
@@ -244,7 +231,9 @@ mod tests {
     fn filtering_keeps_a_uniform_map() {
         let map = EnvironmentMap::from_fn(32, 16, |_| Vec3::splat(2.0));
         for roughness in [0.04, 0.3, 1.0] {
-            assert!(map.filtered(8, 4, roughness).texels.iter().all(|t| t.abs_diff_eq(Vec3::splat(2.0), 1e-4)));
+            assert!(
+                map.filtered(8, 4, roughness).texels.iter().all(|t| t.abs_diff_eq(Vec3::splat(2.0), 1e-4))
+            );
         }
     }
 

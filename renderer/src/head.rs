@@ -301,9 +301,8 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
         .zones
         .chunks(4)
         .map(|zones| {
-            let weights = |u, v| {
-                std::array::from_fn(|i| zones.get(i).map_or(0.0, |z| z.mask.sample(u, v, 0)))
-            };
+            let weights =
+                |u, v| std::array::from_fn(|i| zones.get(i).map_or(0.0, |z| z.mask.sample(u, v, 0)));
             vec![texels(side, weights)]
         })
         .collect();

@@ -20,9 +20,7 @@ pub(crate) fn mip_chain(size: [u32; 2], texels: Vec<Texel>) -> Vec<Vec<Texel>> {
             .with_min_len(4096)
             .map(|i| {
                 let (x, y) = (i as u32 % to[0] * 2, i as u32 / to[0] * 2);
-                let at = |x: u32, y: u32| {
-                    last[(y.min(from[1] - 1) * from[0] + x.min(from[0] - 1)) as usize]
-                };
+                let at = |x: u32, y: u32| last[(y.min(from[1] - 1) * from[0] + x.min(from[0] - 1)) as usize];
                 let corners = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
                 std::array::from_fn(|c| corners.iter().map(|t| t[c]).sum::<f32>() * 0.25)
             })

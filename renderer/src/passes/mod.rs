@@ -1,12 +1,12 @@
 //! One folder a pass: `mod.rs` with its theory, parameters and recording, its kernels, its tests.
 
-pub mod appearance;
-pub mod compose;
-pub mod display;
-pub mod morph;
-pub mod overlay;
-pub mod scatter;
-pub mod shade;
-pub mod shadow;
-pub mod surface_frames;
-pub mod visibility;
+pub(crate) mod appearance;
+pub(crate) mod compose;
+pub(crate) mod display;
+pub(crate) mod morph;
+pub(crate) mod overlay;
+pub(crate) mod scatter;
+pub(crate) mod shade;
+pub(crate) mod shadow;
+pub(crate) mod surface_frames;
+pub(crate) mod visibility;

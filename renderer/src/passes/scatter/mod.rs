@@ -15,7 +15,8 @@ use rubor_rig::skin::kernel::SeparableKernel;
 use crate::gpu::{Gpu, PassTimer};
 
 /// WGSL of the pass.
-pub(crate) const SEPARABLE: &str = concat!(include_str!("../../shared/view.wgsl"), include_str!("separable.wgsl"));
+pub(crate) const SEPARABLE: &str =
+    concat!(include_str!("../../shared/view.wgsl"), include_str!("separable.wgsl"));
 
 /// Samples that a kernel can have.
 pub const MAX_SAMPLES: usize = 65;
@@ -79,4 +80,17 @@ impl Scatter {
             pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
         }
     }
+}
+
+/// The kernel as the shader reads it: the centre first.
+fn params(kernel: &SeparableKernel, direction: [f32; 2]) -> Params {
+    let n = kernel.offsets_mm.len().min(MAX_SAMPLES);
+    let middle = n / 2;
+    let order = std::iter::once(middle).chain((0..n).filter(|i| *i != middle));
+    let mut samples = [[0.0; 4]; MAX_SAMPLES];
+    for (slot, i) in samples.iter_mut().zip(order) {
+        let [r, g, b] = kernel.weights[i].map(|w| w as f32);
+        *slot = [r, g, b, kernel.offsets_mm[i] as f32];
+    }
+    Params { direction, sample_count: n as u32, follow_per_mm: FOLLOW_PER_MM, samples }
 }

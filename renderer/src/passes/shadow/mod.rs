@@ -8,6 +8,7 @@
 //! the resolution of the head and not of the room. All triangles are drawn, front and back: a mouth or a nostril must
 //! block light from either side. The soft edge is in `shade` (percentage-closer soft shadows).
 
+use glam::camera::rh::{proj, view};
 use glam::{Mat4, Vec3};
 
 use crate::gpu::{Gpu, PassTimer};
@@ -15,8 +16,11 @@ use crate::head::HeadOnGpu;
 use crate::scene::LightKind;
 
 /// WGSL of the pass.
-pub(crate) const SHADER: &str =
-    concat!(include_str!("../../shared/view.wgsl"), include_str!("../../shared/surface.wgsl"), include_str!("shadow.wgsl"));
+pub(crate) const SHADER: &str = concat!(
+    include_str!("../../shared/view.wgsl"),
+    include_str!("../../shared/surface.wgsl"),
+    include_str!("shadow.wgsl")
+);
 
 /// A light's view of the heads.
 #[derive(Clone, Copy, Debug)]
@@ -44,15 +48,15 @@ impl LightView {
             None => {
                 let (near, far) = (0.0, 2.0 * radius);
                 let eye = center - direction * radius;
-                let projection = Mat4::orthographic_rh(-radius, radius, -radius, radius, near, far);
-                let view = Mat4::look_to_rh(eye, direction, up);
+                let projection = proj::directx::orthographic(-radius, radius, -radius, radius, near, far);
+                let view = view::look_to_mat4(eye, direction, up);
                 Self { clip_from_world: projection * view, near, far, across: 2.0 * radius }
             }
             Some((eye, distance)) => {
                 let (near, far) = (distance - radius, distance + radius);
                 let tangent = (radius / distance).asin().tan();
-                let projection = Mat4::perspective_rh(2.0 * tangent.atan(), 1.0, near, far);
-                let view = Mat4::look_to_rh(eye, direction, up);
+                let projection = proj::directx::perspective(2.0 * tangent.atan(), 1.0, near, far);
+                let view = view::look_to_mat4(eye, direction, up);
                 Self { clip_from_world: projection * view, near, far, across: 2.0 * tangent }
             }
         }

@@ -16,8 +16,11 @@ use crate::gpu::{Gpu, PassTimer};
 use crate::head::HeadOnGpu;
 
 /// WGSL of the pass.
-pub(crate) const SHADER: &str =
-    concat!(include_str!("../../shared/view.wgsl"), include_str!("../../shared/surface.wgsl"), include_str!("surface_frames.wgsl"));
+pub(crate) const SHADER: &str = concat!(
+    include_str!("../../shared/view.wgsl"),
+    include_str!("../../shared/surface.wgsl"),
+    include_str!("surface_frames.wgsl")
+);
 
 /// Bytes of a frame in the buffer that the pass fills: normal, occlusion, tangent, sign.
 pub(crate) const FRAME_BYTES: u64 = 32;
