@@ -18,10 +18,17 @@
 //! assert_eq!(FaceState::neutral(&head).hemoglobin_scale, 1.0);
 //! ```
 
+pub mod bind;
 pub mod deform;
 pub mod error;
+pub mod evaluate;
+pub mod expression;
 pub mod face_state;
+pub mod framing;
 pub mod head;
+pub mod json;
 pub mod landmarks;
 pub mod map;
 pub mod skin;
+pub mod names;
+pub mod timeline;
