@@ -18,9 +18,11 @@
 //! assert_eq!(FaceState::neutral(&head).hemoglobin_scale, 1.0);
 //! ```
 
+pub mod color;
 pub mod deform;
 pub mod error;
 pub mod face_state;
 pub mod head;
 pub mod landmarks;
 pub mod map;
+pub mod skin;

@@ -1,0 +1,3 @@
+//! Skin as a medium: its colour from chromophores.
+
+pub mod chromophores;
