@@ -126,12 +126,11 @@ impl Directions {
                     ratio += 1.0 / (x - lower);
                 }
                 let step = -1.0 / ratio;
-                let next = if x + step > a && x + step < b { x + step } else { 0.5 * (a + b) };
-                let done = (next - x).abs() <= 1e-14 * upper;
-                x = next;
-                if done || f == 0.0 {
+                if step.abs() <= 1e-14 * x {
+                    x += step;
                     break;
                 }
+                x = if x + step > a && x + step < b { x + step } else { 0.5 * (a + b) };
             }
             *root = x.sqrt();
         }
