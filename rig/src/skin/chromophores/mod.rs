@@ -26,6 +26,7 @@
 pub mod coefficients;
 pub mod invert;
 pub mod layers;
+pub mod monte_carlo;
 pub mod spectra;
 
 use rayon::prelude::*;
@@ -261,7 +262,7 @@ impl SkinLookup {
     /// Bilinear sample at an address, 0..1; a value that is not a number counts as 0.
     pub fn sample_at(&self, u: f32, v: f32) -> [f32; 3] {
         let place = |a: f32, n: u32| {
-            let x = a.max(0.0).min(1.0) * (n - 1) as f32;
+            let x = if a > 0.0 { a.min(1.0) } else { 0.0 } * (n - 1) as f32;
             let i = (x as u32).min(n - 2);
             (i as usize, x - i as f32)
         };
@@ -274,3 +275,6 @@ impl SkinLookup {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;
