@@ -19,6 +19,7 @@
 //! ```
 
 pub mod bind;
+pub mod color;
 pub mod deform;
 pub mod error;
 pub mod evaluate;

@@ -28,3 +28,6 @@ pub mod monte_carlo;
 pub(crate) mod numerics;
 pub mod profile;
 pub mod table;
+//! Skin as a medium: its colour from chromophores.
+
+pub mod chromophores;
