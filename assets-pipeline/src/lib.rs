@@ -1,1 +1,3 @@
 //! Files to heads and back.
+
+pub mod synthesize;
