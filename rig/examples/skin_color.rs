@@ -1,6 +1,11 @@
-//! Bakes the skin colour look-up, prints its accuracy and writes it as a PPM picture: `skin_color [FILE.ppm]`.
-use rubor_rig::color::*;
-use rubor_rig::skin::chromophores::*;
+//! Bakes the skin colour look-up, prints how fast and how accurate it is, and writes it as a picture.
+//!
+//! `cargo run --release -p rubor-rig --example skin_color [PHOTONS [FILE.ppm]]`; with photons (a wavelength) it also
+//! compares with photon walks.
+
+use rubor_rig::color::{ciede2000, individual_typology_angle_degrees, lab_from_rec709, srgb_encode};
+use rubor_rig::skin::chromophores::monte_carlo::{self, Walk};
+use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel, fractions_at, skin_color_direct};
 
 fn main() {
     let model = ChromophoreModel::default();
@@ -35,7 +40,30 @@ fn main() {
         }
         println!("  m={m}");
     }
-    if let Some(file) = std::env::args().nth(1) {
+    let photons = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(0);
+    if photons > 0 {
+        for mean_cosine in [0.0, 0.8] {
+            let walk = Walk { photons, seed: 7, mean_cosine };
+            let (mut sum, mut worst): (f64, f64) = (0.0, 0.0);
+            for j in 0..6 {
+                for i in 0..6 {
+                    let (u, v) = (f64::from(i) / 5.0, f64::from(j) / 5.0);
+                    let [m, h] = fractions_at(u, v);
+                    let truth = lab_from_rec709(monte_carlo::skin_color(&model, m, h, walk).0);
+                    let d = ciede2000(lab_from_rec709(skin.color_at(u, v)), truth);
+                    print!("{d:.2} ");
+                    sum += d;
+                    worst = worst.max(d);
+                }
+                println!();
+            }
+            println!(
+                "table against photons with g = {mean_cosine}, CIEDE2000: mean {:.3} max {worst:.3}",
+                sum / 36.0
+            );
+        }
+    }
+    if let Some(file) = std::env::args().nth(2) {
         let scale = 8;
         let (w, h) = (table.width * scale, table.height * scale);
         let mut bytes = format!("P6 {w} {h} 255\n").into_bytes();

@@ -113,7 +113,8 @@ mod tests {
     fn oxy_and_deoxy_meet_at_the_isosbestic_points() {
         for nm in [390.0, 422.0, 452.4, 500.1, 529.2, 545.3, 570.2, 584.1] {
             let (oxy, deoxy) = (blood_per_mm(nm, 1.0), blood_per_mm(nm, 0.0));
-            assert!((oxy / deoxy - 1.0).abs() < 5e-3, "{nm} nm: {oxy} {deoxy}");
+            // The points are rounded to 0.1 nm, and the table changes by up to 8 % a nm.
+            assert!((oxy / deoxy - 1.0).abs() < 1e-2, "{nm} nm: {oxy} {deoxy}");
         }
     }
 }

@@ -13,6 +13,9 @@
 //! normal that comes out again, which is what a photon walk counts. The beam itself needs no resonant
 //! particular solution this way.
 
+// Indices are those of the matrices in the equations.
+#![allow(clippy::needless_range_loop)]
+
 use super::coefficients::Medium;
 
 /// Directions in a hemisphere: half of them inside the critical angle, half outside.
@@ -126,12 +129,11 @@ impl Directions {
                     ratio += 1.0 / (x - lower);
                 }
                 let step = -1.0 / ratio;
-                let next = if x + step > a && x + step < b { x + step } else { 0.5 * (a + b) };
-                let done = (next - x).abs() <= 1e-14 * upper;
-                x = next;
-                if done || f == 0.0 {
+                if step.abs() <= 1e-14 * x {
+                    x += step;
                     break;
                 }
+                x = if x + step > a && x + step < b { x + step } else { 0.5 * (a + b) };
             }
             *root = x.sqrt();
         }
@@ -205,10 +207,8 @@ impl Directions {
             }
             system[j][2 * N] = self.entering[j];
             let row = &mut system[N + j];
-            for m in 0..N {
-                row[m] = against[j][m];
-                row[N + m] = with[j][m];
-            }
+            row[..N].copy_from_slice(&against[j]);
+            row[N..2 * N].copy_from_slice(&with[j]);
             for i in 0..N {
                 let r = base.reflection[j][i];
                 for m in 0..N {

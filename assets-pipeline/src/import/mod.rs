@@ -1,0 +1,4 @@
+//! Files to heads.
+
+pub mod makehuman;
+pub mod obj;
