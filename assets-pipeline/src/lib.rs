@@ -10,3 +10,4 @@ pub mod convert;
 pub mod error;
 pub mod import;
 pub mod poly;
+pub mod synthesize;
