@@ -30,6 +30,6 @@ pub mod head;
 pub mod json;
 pub mod landmarks;
 pub mod map;
-pub mod skin;
 pub mod names;
+pub mod skin;
 pub mod timeline;

@@ -183,7 +183,7 @@ pub(crate) fn distributions(
     neutral: &Map,
     low: &Coverage<'_>,
     seed: u32,
-) -> Vec<Distribution> {
+) -> (Map, Vec<Distribution>) {
     // A quarter of a million texels carry the statistics of any map.
     let stride = (full.resolution() / 512).max(1);
     let mut stream = Stream::new(seed ^ 0x51de);
@@ -216,7 +216,14 @@ pub(crate) fn distributions(
         .flat_map(|y| (0..low.resolution()).map(move |x| (x, y)))
         .map(|(x, y)| low.site(x, y))
         .collect();
-    STATES
+    let mut neutral_mean = Map::filled(low.resolution(), low.resolution(), &[0.0]);
+    for (value, site) in neutral_mean.values.iter_mut().zip(&sites) {
+        if let Some(site) = site {
+            *value = neutral_statistics.at(site.place).0;
+        }
+    }
+    low.fill_empty(&mut neutral_mean);
+    let distributions = STATES
         .par_iter()
         .enumerate()
         .map(|(index, state)| {
@@ -244,5 +251,6 @@ pub(crate) fn distributions(
             low.fill_empty(&mut bias);
             Distribution { name: state.name.into(), scale, bias }
         })
-        .collect()
+        .collect();
+    (neutral_mean, distributions)
 }

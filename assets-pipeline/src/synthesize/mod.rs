@@ -214,10 +214,10 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let wrinkle_slopes = broad;
 
     let low = surface.rasterise(DISTRIBUTION_RESOLUTION);
-    let distributions = match &hemoglobin {
-        Some(neutral) => expressions::distributions(&chromophores, &full, neutral, &low, seed),
-        None => Vec::new(),
-    };
+    let (hemoglobin_mean, distributions) = hemoglobin
+        .as_ref()
+        .map(|neutral| expressions::distributions(&chromophores, &full, neutral, &low, seed))
+        .unzip();
     let masks = surface.rasterise(MASK_RESOLUTION);
     let zones = masks
         .bake::<12>(&[1; 12], |site| wrinkles::zone_weights(site.place))
@@ -225,7 +225,17 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
         .zip(wrinkles::ZONES)
         .map(|(mask, name)| WrinkleZone { name: name.into(), wrinkle_map: 0, mask })
         .collect();
-    Ok(SkinMaps { melanin, hemoglobin, distributions, slopes, wrinkle_slopes, zones, specular, scattering })
+    Ok(SkinMaps {
+        melanin,
+        hemoglobin,
+        hemoglobin_mean,
+        distributions: distributions.unwrap_or_default(),
+        slopes,
+        wrinkle_slopes,
+        zones,
+        specular,
+        scattering,
+    })
 }
 
 /// Share of the expression wrinkles that stays on the face at rest.

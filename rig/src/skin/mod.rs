@@ -9,6 +9,8 @@
 //!                                                                                          +--> T(s) look-up
 //! ```
 //!
+//! The colour of skin as a whole (melanin, hemoglobin --> linear Rec. 709) is in `chromophores`.
+//!
 //! Lengths are millimetres, coefficients are per millimetre, everything is f64.
 //!
 //! ```
@@ -20,6 +22,7 @@
 //! assert!((red - 1.0).abs() < 1e-12);
 //! ```
 
+pub mod chromophores;
 pub mod diffusion;
 pub mod gaussians;
 pub mod kernel;
@@ -28,6 +31,3 @@ pub mod monte_carlo;
 pub(crate) mod numerics;
 pub mod profile;
 pub mod table;
-//! Skin as a medium: its colour from chromophores.
-
-pub mod chromophores;

@@ -19,7 +19,7 @@ pub(crate) const SEPARABLE: &str =
     concat!(include_str!("../../shared/view.wgsl"), include_str!("separable.wgsl"));
 
 /// Samples that a kernel can have.
-pub const MAX_SAMPLES: usize = 65;
+pub(crate) const MAX_SAMPLES: usize = 65;
 
 /// Share of a neighbour that is given back to the centre for each millimetre of depth between the two. A step of 4 mm
 /// (lip over teeth, wing of the nose over cheek) separates fully; the slope of a cheek does not.
