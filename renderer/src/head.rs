@@ -66,6 +66,8 @@ pub struct HeadOnGpu {
 
 pub(crate) struct MapsOnGpu {
     pub(crate) skin: wgpu::TextureView,
+    pub(crate) gloss: wgpu::TextureView,
+    pub(crate) hair_color_linear: [f32; 3],
     pub(crate) slopes: wgpu::TextureView,
     pub(crate) wrinkles: wgpu::TextureView,
     pub(crate) wrinkle_maps: u32,
@@ -154,7 +156,8 @@ impl HeadOnGpu {
             &self.ring,
         ];
         let textures = self.maps.iter().flat_map(|m| {
-            [&m.skin, &m.slopes, &m.wrinkles, &m.distributions, &m.neutral_mean, &m.masks].map(texture_bytes)
+            [&m.skin, &m.gloss, &m.slopes, &m.wrinkles, &m.distributions, &m.neutral_mean, &m.masks]
+                .map(texture_bytes)
         });
         buffers.iter().map(|b| b.size()).sum::<u64>() + textures.sum::<u64>()
     }
@@ -241,25 +244,29 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
     let (melanin, hemoglobin) = (maps.melanin.as_ref()?, maps.hemoglobin.as_ref()?);
     let default_specular = Map::filled(1, 1, &[0.6, 0.32]);
     let specular = maps.specular.as_ref().unwrap_or(&default_specular);
-    let size = largest(&[melanin, hemoglobin, specular]);
+    let flat = Map::filled(1, 1, &[0.0, 0.0]);
+    let zero = Map::filled(1, 1, &[0.0]);
+    let full = Map::filled(1, 1, &[1.0]);
+    let scattering = maps.scattering.as_ref().unwrap_or(&full);
+    let hair = maps.hair.as_ref().unwrap_or(&zero);
+    let size = largest(&[melanin, hemoglobin, scattering, hair]);
     let skin = texels(size, |u, v| {
         let axis = |value: f32, most: f32| (value.max(0.0) / most).cbrt();
         [
             axis(melanin.sample(u, v, 0), MAX_MELANIN),
             axis(hemoglobin.sample(u, v, 0), MAX_HEMOGLOBIN),
-            specular.sample(u, v, 0),
-            specular.sample(u, v, 1),
+            scattering.sample(u, v, 0),
+            hair.sample(u, v, 0),
         ]
     });
-    let flat = Map::filled(1, 1, &[0.0, 0.0]);
-    let full = Map::filled(1, 1, &[1.0]);
+    let gloss_size = largest(&[specular]);
+    let gloss = texels(gloss_size, |u, v| [specular.sample(u, v, 0), specular.sample(u, v, 1), 0.0, 0.0]);
     let slopes = maps.slopes.as_ref().unwrap_or(&flat);
-    let scattering = maps.scattering.as_ref().unwrap_or(&full);
-    let slope_size = largest(&[slopes, scattering]);
+    let slope_size = largest(&[slopes]);
     // Channel 2 averages the squared slope on the way down, so that each level knows the variance it lost.
     let slope_texels = texels(slope_size, |u, v| {
         let (x, y) = (slopes.sample(u, v, 0), slopes.sample(u, v, 1));
-        [x, y, 0.5 * (x * x + y * y), scattering.sample(u, v, 0)]
+        [x, y, 0.5 * (x * x + y * y), 0.0]
     });
     let mut slope_chain = texture::mip_chain(slope_size, slope_texels);
     for level in &mut slope_chain {
@@ -280,7 +287,6 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
         wrinkle_layers.push(texture::mip_chain([1, 1], vec![[0.0; 4]]));
     }
 
-    let zero = Map::filled(1, 1, &[0.0]);
     let mean = maps.hemoglobin_mean.as_ref().unwrap_or(&zero);
     let side = [APPEARANCE_SIZE; 2];
     let mut distributions: Vec<_> = maps
@@ -312,6 +318,8 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
 
     Some(MapsOnGpu {
         skin: texture::upload_bytes(gpu, "skin", size, &[texture::mip_chain(size, skin)]),
+        gloss: texture::upload_bytes(gpu, "gloss", gloss_size, &[texture::mip_chain(gloss_size, gloss)]),
+        hair_color_linear: maps.hair_color_linear,
         slopes: texture::upload_half(gpu, "slopes", slope_size, &[slope_chain]),
         wrinkles: texture::array_view(&texture::upload_half(gpu, "wrinkles", wrinkle_size, &wrinkle_layers)),
         wrinkle_maps: maps.wrinkle_slopes.len() as u32,

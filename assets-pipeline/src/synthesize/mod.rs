@@ -235,6 +235,8 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
         zones,
         specular,
         scattering,
+        hair: None,
+        hair_color_linear: [0.0; 3],
     })
 }
 

@@ -57,6 +57,7 @@ pub(crate) struct Params {
     pub(crate) environment_levels: f32,
     pub(crate) has_maps: u32,
     pub(crate) wrinkle_map_count: u32,
+    pub(crate) hair_color: [f32; 4],
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
@@ -170,6 +171,10 @@ impl Shade {
             environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
             has_maps: u32::from(maps.is_some()),
             wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
+            hair_color: maps.map_or([0.0; 4], |m| {
+                let [r, g, b] = m.hair_color_linear;
+                [r, g, b, 1.0]
+            }),
             harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
             lights: lighting.lights,
         };
@@ -201,6 +206,7 @@ impl Shade {
                 shaded.head.triangles.as_entire_binding(),
                 shaded.frames.as_entire_binding(),
                 texture(maps.map_or(&self.black, |m| &m.skin)),
+                texture(maps.map_or(&self.black, |m| &m.gloss)),
                 texture(maps.map_or(&self.black, |m| &m.slopes)),
                 texture(maps.map_or(&self.black_array, |m| &m.wrinkles)),
                 texture(&shaded.blended.blood),

@@ -26,6 +26,8 @@ struct Params {
     // 1 where the head has maps.
     has_maps: u32,
     wrinkle_map_count: u32,
+    // rgb = albedo of hair drawn with the skin.
+    hair_color: vec4f,
     // Real spherical harmonics of the environment's irradiance / pi, rgb.
     harmonics: array<vec4f, 9>,
     lights: array<Light, 8>,
@@ -44,14 +46,16 @@ struct Params {
 @group(1) @binding(1) var<storage, read> vertices: array<Vertex>;
 @group(1) @binding(2) var<storage, read> triangles: array<vec4u>;
 @group(1) @binding(3) var<storage, read> frames: array<SurfaceFrame>;
-// r = cube root of melanin / 0.5, g = cube root of hemoglobin / 0.32, b = specular intensity, a = roughness.
+// r = cube root of melanin / 0.5, g = cube root of hemoglobin / 0.32, b = scattering strength, a = hair cover.
 @group(1) @binding(4) var skin_map: texture_2d<f32>;
-// rg = slopes, b = variance lost in minification, a = scattering strength.
-@group(1) @binding(5) var slope_map: texture_2d<f32>;
-@group(1) @binding(6) var wrinkle_maps: texture_2d_array<f32>;
-@group(1) @binding(7) var blood: texture_2d<f32>;
-@group(1) @binding(8) var wrinkle_weights: texture_2d<f32>;
-@group(1) @binding(9) var skin_color: texture_2d<f32>;
+// r = specular intensity, g = roughness.
+@group(1) @binding(5) var gloss_map: texture_2d<f32>;
+// rg = slopes, b = variance lost in minification.
+@group(1) @binding(6) var slope_map: texture_2d<f32>;
+@group(1) @binding(7) var wrinkle_maps: texture_2d_array<f32>;
+@group(1) @binding(8) var blood: texture_2d<f32>;
+@group(1) @binding(9) var wrinkle_weights: texture_2d<f32>;
+@group(1) @binding(10) var skin_color: texture_2d<f32>;
 
 // Diffuse radiance of a white surface; a = scattering strength, 0 where nothing scatters.
 @group(2) @binding(0) var diffuse_out: texture_storage_2d<rgba16float, write>;
@@ -223,11 +227,14 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
     (*surface).albedo =
         textureSampleLevel(skin_color, linear_clamp, (axes * (table - 1.0) + 0.5) / table, 0.0).rgb;
 
-    (*surface).specular = map.b;
+    (*surface).albedo = mix((*surface).albedo, params.hair_color.rgb, map.a);
+
+    let gloss = textureSampleGrad(gloss_map, trilinear_repeat, uv, duv_dx, duv_dy);
+    (*surface).specular = gloss.r;
     // Slope variance that the mip level hides is roughness (Toksvig 2005; for Beckmann m^2 = 2 sigma^2).
     let variance = square(params.slope_scale) * fine.z;
-    (*surface).roughness = sqrt(min(square(map.a) + 2.0 * variance, 0.64));
-    (*surface).scattering = fine.a;
+    (*surface).roughness = sqrt(min(square(gloss.g) + 2.0 * variance, 0.64));
+    (*surface).scattering = map.b;
 }
 
 // The azimuthal coordinates of Material::Eye. Angles in radians.
