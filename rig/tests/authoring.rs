@@ -699,6 +699,8 @@ fn schemas_name_every_field_and_forbid_others() {
     for field in ["size", "shapes", "head", "camera", "lights", "environment"] {
         assert!(sequence["properties"][field].is_object(), "{field}");
     }
+    assert_eq!(sequence["properties"]["fps"]["exclusiveMinimum"], 0);
+    assert!(sequence["$defs"]["Key_of_float"]["properties"]["ease"].is_object());
     let eases = sequence["$defs"]["Ease"].to_string();
     for ease in Ease::ALL {
         assert!(eases.contains(&serde_json::to_string(&ease).unwrap()), "{ease:?}");
