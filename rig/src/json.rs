@@ -176,9 +176,6 @@ fn parse(text: &str) -> Result<Option<Value<'_>>, jsonc_parser::errors::ParseErr
 }
 
 fn place_of_offset(file: &str, text: &str, offset: usize) -> Place {
-    if text.is_empty() {
-        return Place { file: file.to_owned(), line: 0, column: 0 };
-    }
     let before = text.get(..offset).unwrap_or(text);
     let line_start = before.rfind('\n').map_or(0, |i| i + 1);
     Place {
@@ -211,9 +208,10 @@ fn syntax_error(file: &str, text: &str, error: &jsonc_parser::errors::ParseError
         | Kind::HexadecimalNumbersNotAllowed
         | Kind::UnaryPlusNumbersNotAllowed => "a decimal number such as -0.5",
         Kind::String(_) => "a string that ends in a double quote and has no unknown escapes",
-        Kind::UnexpectedCloseBrace
-        | Kind::UnexpectedCloseBracket
-        | Kind::UnexpectedColon
+        Kind::UnexpectedCloseBrace | Kind::UnexpectedCloseBracket => {
+            "a value, or the bracket that closes what is open"
+        }
+        Kind::UnexpectedColon
         | Kind::UnexpectedComma
         | Kind::UnexpectedToken
         | Kind::TrailingCommasNotAllowed
@@ -221,7 +219,13 @@ fn syntax_error(file: &str, text: &str, error: &jsonc_parser::errors::ParseError
     };
     RigError {
         place: place_of_offset(file, text, range.start),
-        found: excerpt(text, range.start),
+        found: match error.kind() {
+            // Their place is the beginning, which is easier to find the mistake from than the end of the file.
+            Kind::UnterminatedArray | Kind::UnterminatedObject => {
+                "an opening bracket without its end".to_owned()
+            }
+            _ => excerpt(text, range.start),
+        },
         expected: expected.to_owned(),
         nearest: None,
     }
@@ -231,7 +235,7 @@ fn syntax_error(file: &str, text: &str, error: &jsonc_parser::errors::ParseError
 fn excerpt(text: &str, offset: usize) -> String {
     const LONGEST: usize = 24;
     let rest = text.get(offset..).unwrap_or_default();
-    let line = rest.lines().next().unwrap_or_default().trim_end();
+    let line = rest.lines().next().unwrap_or_default().trim();
     if rest.is_empty() {
         "the end of the file".to_owned()
     } else if line.is_empty() {

@@ -1,10 +1,12 @@
 //! The face and its skin as numbers.
 //!
 //! ```text
-//! Head (mesh, shapes, maps) --+
-//! Rig (rig.json) -------------+--> evaluate(time) --> FaceState --> renderer, export
-//! Sequence (sequence.json) ---+                           |
-//!                                                         +--> deform (CPU truth of the kernels)
+//! rig.json -------> expression::Rig ------+
+//! Head (names) ---------------------------+--> bind::BoundRig -----+
+//! sequence.json --> timeline::Sequence ----------------------------+--> evaluate::Evaluator
+//!   (json: every error with file, line, column)                               | at(time)
+//!                                                                             v
+//! Head (points) --> deform (CPU truth of the kernels) <-- FaceState <-- evaluate::Shot --> renderer, export
 //! ```
 //!
 //! Pure CPU: no GPU, no file formats beyond serde.

@@ -269,11 +269,13 @@ pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>)
     let mut best: Option<(f64, &str)> = None;
     for candidate in candidates {
         let other = candidate.to_lowercase();
-        // Winkler's bonus for a common start alone would prefer `mouthLeft` to a real `mouthLowerDownLeft`.
-        let similarity = 0.5
-            * (strsim::jaro_winkler(&lower, &other) + strsim::normalized_damerau_levenshtein(&lower, &other));
-        let floor = LEAST_SIMILARITY.min(strsim::jaro_winkler(&lower, &other));
-        if floor >= LEAST_SIMILARITY && best.is_none_or(|(s, _)| similarity > s) {
+        let winkler = strsim::jaro_winkler(&lower, &other);
+        if winkler < LEAST_SIMILARITY {
+            continue;
+        }
+        // Winkler's bonus for a common start alone would prefer a short name to a long one with a slip in it.
+        let similarity = winkler + strsim::normalized_damerau_levenshtein(&lower, &other);
+        if best.is_none_or(|(most, _)| similarity > most) {
             best = Some((similarity, candidate));
         }
     }

@@ -41,8 +41,10 @@ pub struct Sequence {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub description: String,
     /// Frames a second.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub fps: f64,
     /// Length in seconds.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub duration: f64,
     /// Width and height of the pictures in pixels, unless the command line says otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -198,8 +200,10 @@ pub enum Track<T> {
 /// A value at a time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "Key_of_{T}")]
 pub struct Key<T> {
     /// Seconds from the start of the sequence, 0 or more.
+    #[schemars(range(min = 0))]
     pub t: f64,
     /// Value at that time.
     pub v: T,
