@@ -442,13 +442,8 @@ fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
 
 /// Placement of a head: its own motion first, then its place in the scene.
 fn world_from_head(instance: &crate::scene::HeadInstance<'_>) -> Mat4 {
-    let (low, high) = instance.head.bounds;
-    // The head turns about the top of the neck: below and behind the middle of its bounds.
-    let pivot = Vec3::new(0.0, low.y + 0.42 * (high.y - low.y), low.z + 0.4 * (high.z - low.z));
     instance.world_from_head
-        * Mat4::from_translation(pivot + instance.state.head_translation)
-        * Mat4::from_quat(instance.state.head_rotation)
-        * Mat4::from_translation(-pivot)
+        * Mat4::from_rotation_translation(instance.state.head_rotation, instance.state.head_translation)
 }
 
 /// Lights for the shader, and (view, layer) of those that cast shadows.
