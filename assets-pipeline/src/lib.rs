@@ -8,5 +8,7 @@
 
 pub mod convert;
 pub mod error;
+pub mod export;
+pub mod facial_appearance;
 pub mod import;
 pub mod poly;
