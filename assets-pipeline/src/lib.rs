@@ -8,6 +8,8 @@
 
 pub mod convert;
 pub mod error;
+pub mod export;
+pub mod facial_appearance;
 pub mod import;
 pub mod poly;
 pub mod synthesize;
