@@ -67,6 +67,9 @@ pub struct MapEntries {
     /// Volume fraction of hemoglobin in the dermis, neutral state.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hemoglobin: Option<MapEntry>,
+    /// Local mean of the neutral hemoglobin, which `distributions` are relative to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hemoglobin_mean: Option<MapEntry>,
     /// Local statistics of other states.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub distributions: Vec<DistributionEntry>,
@@ -85,6 +88,11 @@ pub struct MapEntries {
     /// Strength of subsurface scattering.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scattering: Option<MapEntry>,
+    /// Share of the skin under short hair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hair: Option<MapEntry>,
+    /// Albedo of that hair, linear Rec. 709.
+    pub hair_color_linear: [f32; 3],
 }
 
 /// A map in an image of the document.

@@ -28,11 +28,8 @@ pub(crate) fn page(frames: &[RgbImage]) -> RgbImage {
     let (w, h) = frames.first().map_or((1, 1), RgbImage::dimensions);
     let columns = COLUMNS.min(frames.len() as u32).max(1);
     let rows = (frames.len() as u32).div_ceil(columns).max(1);
-    let mut page = RgbImage::from_pixel(
-        columns * (w + GAP) + GAP,
-        rows * (h + GAP) + GAP,
-        image::Rgb([24, 24, 26]),
-    );
+    let mut page =
+        RgbImage::from_pixel(columns * (w + GAP) + GAP, rows * (h + GAP) + GAP, image::Rgb([24, 24, 26]));
     for (i, frame) in frames.iter().enumerate() {
         let (x, y) = (i as u32 % columns, i as u32 / columns);
         let place = |n: u32, step: u32| i64::from(GAP + n * (step + GAP));

@@ -148,11 +148,13 @@ fn finish(mut head: Head, common: &Common) -> Outcome {
         return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
     }
     if head.maps.melanin.is_none() && common.maps > 0 {
-        let mut options = synthesize::Options { seed: common.seed, resolution: common.maps, ..Default::default() };
+        let mut options =
+            synthesize::Options { seed: common.seed, resolution: common.maps, ..Default::default() };
         options.melanin = common.melanin.unwrap_or(options.melanin);
         synthesize::synthesize_into(&mut head, &options).map_err(Failure::input)?;
     }
-    let rig = serde_json::from_str(&strip(rubor_rig::expression::Rig::default_rig()?)?).map_err(Failure::job)?;
+    let rig =
+        serde_json::from_str(&strip(rubor_rig::expression::Rig::default_rig()?)?).map_err(Failure::job)?;
     let options = export::gltf::Options {
         base_color: neutral_color(&head),
         rig: Some(rig),

@@ -43,10 +43,7 @@ impl Progress {
         if line || self.done == self.total {
             let each_s = self.started.elapsed().as_secs_f64() / self.done as f64;
             let left_s = each_s * (self.total - self.done) as f64;
-            eprintln!(
-                "{}/{} {}, {each_s:.2} s each, {left_s:.0} s left",
-                self.done, self.total, self.what
-            );
+            eprintln!("{}/{} {}, {each_s:.2} s each, {left_s:.0} s left", self.done, self.total, self.what);
         }
     }
 

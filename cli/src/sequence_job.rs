@@ -157,8 +157,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
             Some(picture) => picture,
             None => {
                 let at = Instant::now();
-                let mut shots: Vec<Shot> =
-                    evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
+                let mut shots: Vec<Shot> = evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
                 step_back(&mut shots);
                 let (image, stats) = studio.render(&shots, spacing, &settings)?;
                 let picture = opaque(image);
@@ -213,9 +212,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
 fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
     let scatter = match arguments.scatter {
         Scatter::None => None,
-        Scatter::Separable(n) => {
-            Some(SeparableKernel::of(&Profile::deon_six(), n).map_err(Failure::input)?)
-        }
+        Scatter::Separable(n) => Some(SeparableKernel::of(&Profile::deon_six(), n).map_err(Failure::input)?),
     };
     let supersampling = match arguments.antialias {
         Antialias::None => 1,
@@ -328,7 +325,7 @@ pub(crate) fn neutral_color(head: &Head) -> Option<RgbImage> {
         let skin = lookup.sample(melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));
         let hair = maps.hair.as_ref().map_or(0.0, |h| h.sample(u, v, 0));
         let rgb = std::array::from_fn(|c| skin[c] + hair * (maps.hair_color_linear[c] - skin[c]));
-        image::Rgb(rgb.map(rubor_rig::color::srgb_byte_from_linear))
+        image::Rgb(rgb.map(|c| (rubor_rig::color::srgb_encode(c) * 255.0).round() as u8))
     }))
 }
 

@@ -103,8 +103,9 @@ fn key(state: &EnvironmentState) -> String {
 
 fn load_map(path: &str) -> Outcome<EnvironmentMap> {
     let wrong = |e: &dyn std::fmt::Display| {
-        Failure::input(format!("environment {path:?}: {e}"))
-            .hint("built in is \"studio\"; anything else is the path of an equirectangular .hdr or .exr image")
+        Failure::input(format!("environment {path:?}: {e}")).hint(
+            "built in is \"studio\"; anything else is the path of an equirectangular .hdr or .exr image",
+        )
     };
     if !std::path::Path::new(path).is_file() {
         return Err(wrong(&"no such file, and no built-in environment of that name"));

@@ -16,7 +16,8 @@ pub(crate) enum Video {
 
 /// Encodes `frame.0001.png ...` of a folder. H.264, yuv420p, Rec. 709 with sRGB transfer, playable while it loads.
 pub(crate) fn encode(folder: &Path, first: u32, fps: f64, path: &Path) -> Outcome<Video> {
-    let available = Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    let available =
+        Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !available.is_ok_and(|s| s.success()) {
         return Ok(Video::NoEncoder);
     }

@@ -23,7 +23,7 @@ pub struct MapEncodings {
     pub wrinkle_slopes: MapEncoding,
     /// Specular intensity and roughness.
     pub specular: MapEncoding,
-    /// Scattering strength.
+    /// Scattering strength and hair.
     pub scattering: MapEncoding,
 }
 
@@ -74,9 +74,11 @@ pub(super) fn write(
     };
     let melanin = optional("melanin", &maps.melanin, encodings.melanin)?;
     let hemoglobin = optional("hemoglobin", &maps.hemoglobin, encodings.hemoglobin)?;
+    let hemoglobin_mean = optional("hemoglobin mean", &maps.hemoglobin_mean, encodings.distributions)?;
     let slopes = optional("slopes", &maps.slopes, encodings.slopes)?;
     let specular = optional("specular", &maps.specular, encodings.specular)?;
     let scattering = optional("scattering", &maps.scattering, encodings.scattering)?;
+    let hair = optional("hair", &maps.hair, encodings.scattering)?;
     let mut distributions = Vec::new();
     for d in &maps.distributions {
         let scale = put(&format!("{} scale", d.name), &d.scale, encodings.distributions)?;
@@ -88,7 +90,19 @@ pub(super) fn write(
         wrinkle_slopes.push(put(&format!("wrinkle slopes {i}"), map, encodings.wrinkle_slopes)?);
     }
     let zones = zones(&maps.zones, buffer)?;
-    Ok(MapEntries { melanin, hemoglobin, distributions, slopes, wrinkle_slopes, zones, specular, scattering })
+    Ok(MapEntries {
+        melanin,
+        hemoglobin,
+        hemoglobin_mean,
+        distributions,
+        slopes,
+        wrinkle_slopes,
+        zones,
+        specular,
+        scattering,
+        hair,
+        hair_color_linear: maps.hair_color_linear,
+    })
 }
 
 /// Four masks of one size share an RGBA image; values are clamped to 0 to 1.

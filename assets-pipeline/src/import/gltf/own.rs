@@ -138,9 +138,12 @@ fn maps(document: &Document, entries: &MapEntries) -> Result<SkinMaps, ImportErr
     let mut maps = SkinMaps {
         melanin: optional("melanin", &entries.melanin, 1)?,
         hemoglobin: optional("hemoglobin", &entries.hemoglobin, 1)?,
+        hemoglobin_mean: optional("hemoglobin mean", &entries.hemoglobin_mean, 1)?,
         slopes: optional("slopes", &entries.slopes, 2)?,
         specular: optional("specular", &entries.specular, 2)?,
         scattering: optional("scattering", &entries.scattering, 1)?,
+        hair: optional("hair", &entries.hair, 1)?,
+        hair_color_linear: entries.hair_color_linear,
         ..SkinMaps::default()
     };
     for d in &entries.distributions {
