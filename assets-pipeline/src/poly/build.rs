@@ -21,12 +21,12 @@ pub fn build_head(
 ) -> (Head, Vec<u32>) {
     let mut new_point = vec![u32::MAX; mesh.points.len()];
     let mut out = Mesh::default();
-    let mut vertex_of: HashMap<(u32, u32), u32> = HashMap::new();
     for (i, (_, part_name, material)) in parts.iter().enumerate() {
         if parts[..i].iter().any(|p| p.1 == *part_name) {
             continue;
         }
         let start = out.triangles.len() as u32;
+        let mut vertex_of: HashMap<(u32, u32), u32> = HashMap::new(); // parts share points, not vertices
         let members: Vec<bool> =
             mesh.groups.iter().map(|g| parts.iter().any(|p| p.0 == g && p.1 == *part_name)).collect();
         for f in (0..mesh.face_count()).filter(|f| members[mesh.face_groups[*f] as usize]) {

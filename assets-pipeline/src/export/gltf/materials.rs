@@ -10,6 +10,7 @@ use super::Options;
 use super::buffer::Buffer;
 use crate::error::ExportError;
 use crate::export::image_codec::{encode_jpeg, encode_png};
+use crate::import::eye_projection::LIMBUS_UV;
 
 /// Quality of the pictures that only other viewers use.
 const JPEG_QUALITY: u8 = 90;
@@ -17,8 +18,7 @@ const JPEG_QUALITY: u8 = 90;
 const EYE_SIZE: u32 = 512;
 /// Size of the lash picture: along the lid, root to tip.
 const LASH_SIZE: (u32, u32) = (512, 64);
-/// Texture radius of limbus and pupil in the projection of [`Material::Eye`].
-const LIMBUS_UV: f32 = 0.0819;
+/// Texture radius of the pupil in the projection of [`Material::Eye`].
 const PUPIL_UV: f32 = 0.035;
 
 /// Materials and textures of the document.

@@ -3,25 +3,26 @@
 use std::f32::consts::{PI, TAU};
 
 use glam::{Mat3, Vec2, Vec3};
-use nalgebra::{DMatrix, DVector, Matrix3};
+use nalgebra::Matrix3;
 
 use super::append_points;
+use crate::import::eye_projection::{LIMBUS_RADIUS, fit_sphere, limbus_angle, uv_radius};
 use crate::poly::{Corner, PolyMesh, Shape};
 
 /// Points of the two helper balls.
 const HELPERS: [(&str, std::ops::Range<usize>); 2] =
     [("eye-left", 14598..14670), ("eye-right", 14670..14742)];
 
-/// Radius of the iris where it meets the white, metres (visible iris diameter 11.8 mm).
-const LIMBUS_RADIUS: f32 = 0.0059;
 /// Radius of curvature of the cornea, metres (Gullstrand's eye: 7.7 mm; larger here because the base mesh's eyeball is).
 const CORNEA_RADIUS: f32 = 0.0085;
+/// From the centre of the helper ball to that of the eye: outwards and up, metres. The opening of the lids lies outside
+/// and below the middle of the helper; without this the face squints. Set by eye on the default head.
+const SHIFT: (f32, f32) = (0.0010, -0.0010);
+/// Turn of the pupil axis outwards and down, radians: 3 and 2 degrees. The pupil axis of a human eye that looks at
+/// something stands 3 to 5 degrees outside of the line of sight (angle kappa).
+const TURN: (f32, f32) = (0.052, 0.035);
 /// Segments around the axis.
 const SEGMENTS: u32 = 32;
-/// Texture radius of the limbus: that of an anatomical eye of 12 mm radius, asin(5.9 / 12) / (2 pi).
-/// Angles are stretched so that it is the same for every eye, whatever the size of its ball.
-const LIMBUS_UV: f32 = 0.0819;
-
 /// An eyeball and how the shapes turn it.
 pub(super) struct Eye {
     pub(super) group: &'static str,
@@ -35,7 +36,9 @@ pub(super) struct Eye {
 pub(super) fn fit(mesh: &PolyMesh, shapes: &[Shape]) -> Vec<Eye> {
     let eye = |(group, range): &(&'static str, std::ops::Range<usize>)| {
         let points = &mesh.points[range.clone()];
-        let (center, radius) = fit_sphere(points);
+        let (middle, radius) = fit_sphere(points);
+        let side = middle.x.signum();
+        let center = middle + Vec3::new(SHIFT.0 * side, SHIFT.1, 0.0);
         let moves = (shapes.iter().enumerate())
             .filter(|(_, s)| s.offsets[range.clone()].iter().any(|o| *o != Vec3::ZERO))
             .map(|(i, s)| {
@@ -46,21 +49,6 @@ pub(super) fn fit(mesh: &PolyMesh, shapes: &[Shape]) -> Vec<Eye> {
         Eye { group, center, radius, moves }
     };
     HELPERS.iter().map(eye).collect()
-}
-
-/// Least squares sphere: |p|^2 = 2 c.p + (r^2 - |c|^2), linear in c and the bracket.
-fn fit_sphere(points: &[Vec3]) -> (Vec3, f32) {
-    let mean = points.iter().sum::<Vec3>() / points.len() as f32;
-    let local: Vec<Vec3> = points.iter().map(|p| *p - mean).collect();
-    let a = DMatrix::from_fn(local.len(), 4, |i, j| if j < 3 { 2.0 * f64::from(local[i][j]) } else { 1.0 });
-    let b = DVector::from_fn(local.len(), |i, _| f64::from(local[i].length_squared()));
-    match a.svd(true, true).solve(&b, 1e-12) {
-        Ok(x) => {
-            let c = Vec3::new(x[0] as f32, x[1] as f32, x[2] as f32);
-            (mean + c, (x[3] as f32 + c.length_squared()).max(0.0).sqrt())
-        }
-        Err(_) => (mean, 0.0),
-    }
 }
 
 /// Least squares rotation about `center` and translation (W. Kabsch 1976).
@@ -90,7 +78,9 @@ fn fit_motion(points: &[Vec3], offsets: &[Vec3], center: Vec3) -> (Mat3, Vec3) {
 pub(super) fn add(mesh: &mut PolyMesh, shapes: &mut [Shape], eyes: &[Eye]) {
     for eye in eyes {
         let profile = Profile::new(eye.radius);
-        let (points, uvs, quads) = ball(&profile);
+        let (mut points, uvs, quads) = ball(&profile);
+        let look = Mat3::from_rotation_y(TURN.0 * eye.center.x.signum()) * Mat3::from_rotation_x(TURN.1);
+        points.iter_mut().for_each(|p| *p = look * *p);
         let first = append_points(mesh, shapes, points.iter().map(|p| eye.center + *p));
         let first_uv = mesh.uvs.len() as u32;
         mesh.uvs.extend(uvs);
@@ -116,7 +106,7 @@ struct Profile {
 
 impl Profile {
     fn new(radius: f32) -> Self {
-        let limbus = (LIMBUS_RADIUS / radius).clamp(0.05, 0.9).asin();
+        let limbus = limbus_angle(radius);
         let cornea = CORNEA_RADIUS.min(radius);
         let cornea_center = radius * limbus.cos() - (cornea * cornea - LIMBUS_RADIUS.powi(2)).max(0.0).sqrt();
         Self { radius, limbus, cornea, cornea_center }
@@ -132,15 +122,6 @@ impl Profile {
         let cornea = self.cornea_center * cos + root.sqrt();
         let (d, width) = (cornea - self.radius, 0.0003);
         0.5 * (cornea + self.radius + (d * d + width * width).sqrt()) - 0.5 * width
-    }
-
-    /// Texture radius: proportional to the angle up to the limbus and from there on.
-    fn uv_radius(&self, theta: f32) -> f32 {
-        if theta <= self.limbus {
-            LIMBUS_UV * theta / self.limbus
-        } else {
-            LIMBUS_UV + (0.5 - LIMBUS_UV) * (theta - self.limbus) / (PI - self.limbus)
-        }
     }
 }
 
@@ -161,7 +142,7 @@ fn ball(profile: &Profile) -> (Vec<Vec3>, Vec<Vec2>, Vec<Vec<u32>>) {
         for s in 0..SEGMENTS {
             let phi = TAU * s as f32 / SEGMENTS as f32;
             points.push(direction(*theta, phi));
-            uvs.push(Vec2::splat(0.5) + profile.uv_radius(*theta) * Vec2::new(phi.cos(), phi.sin()));
+            uvs.push(Vec2::splat(0.5) + uv_radius(*theta, profile.limbus) * Vec2::new(phi.cos(), phi.sin()));
         }
     }
     points.push(Vec3::new(0.0, 0.0, -profile.radius));
@@ -181,6 +162,7 @@ fn ball(profile: &Profile) -> (Vec<Vec3>, Vec<Vec2>, Vec<Vec<u32>>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::eye_projection::LIMBUS_UV;
 
     #[test]
     fn a_ball_faces_outwards_and_bulges_at_the_cornea() {

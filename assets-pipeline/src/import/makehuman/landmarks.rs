@@ -34,14 +34,19 @@ const PAIRED: [(&str, u32, u32); 13] = [
     ("lid-lower", 7787, 1095),
     ("cheilion", 7272, 527),
     ("brow-inner", 6983, 208),
-    ("brow-middle", 7002, 229),
+    ("brow-middle", 6996, 222),
     ("brow-outer", 6999, 225),
     ("cheek", 11909, 5304),
-    ("alare", 11684, 5068),
+    ("alare", 7081, 319),
     ("zygion", 11845, 5236),
     ("gonion", 7459, 739),
     ("ear", 12038, 5439),
 ];
+
+/// Left and right point of a pair.
+pub(super) fn pair(name: &str) -> Option<[u32; 2]> {
+    PAIRED.iter().find(|p| p.0 == name).map(|(_, left, right)| [*left, *right])
+}
 
 /// All landmarks of a mesh whose first points are those of the base mesh (subdivided or not).
 pub(super) fn of(mesh: &PolyMesh, eyes: &[Eye]) -> BTreeMap<String, Vec3> {

@@ -128,6 +128,7 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     mesh.points.iter_mut().for_each(|p| *p = (*p - origin) * METRES_PER_DECIMETRE);
     shapes.iter_mut().flat_map(|s| &mut s.offsets).for_each(|o| *o *= METRES_PER_DECIMETRE);
 
+    fit_blinks(&mesh, &mut shapes);
     layout::split_body(&mut mesh);
     let bust = Bust::of(&mesh);
     let wanted: Vec<bool> =
@@ -187,6 +188,23 @@ fn check(options: &Options) -> Result<(), ImportError> {
         return fail("subdivide", options.subdivide.to_string(), "0, 1 or 2");
     }
     Ok(())
+}
+
+/// Scales the blinks so that the lids of this head meet: face units were made for another width of the eyes.
+fn fit_blinks(mesh: &PolyMesh, shapes: &mut [Shape]) {
+    let (Some(upper), Some(lower)) = (landmarks::pair("lid-upper"), landmarks::pair("lid-lower")) else {
+        return;
+    };
+    for (name, side) in [("eyeBlinkLeft", 0), ("eyeBlinkRight", 1)] {
+        let Some(shape) = shapes.iter_mut().find(|s| s.name == name) else { continue };
+        let (upper, lower) = (upper[side] as usize, lower[side] as usize);
+        let gap = mesh.points[upper].y - mesh.points[lower].y;
+        let closing = shape.offsets[lower].y - shape.offsets[upper].y;
+        if gap > 0.0 && closing > 0.0 {
+            let scale = (gap / closing).clamp(0.5, 1.5);
+            shape.offsets.iter_mut().for_each(|o| *o *= scale);
+        }
+    }
 }
 
 /// Centre of the helper cube that marks a joint.
