@@ -1,13 +1,13 @@
 //! Mean and standard deviation in a disk around every texel (papers/004 eq. 7.1), exactly.
 //!
 //! ```text
-//! f32 values --fixed point, 25 bits--> row prefix sums of q, q^2 and the count (u64, wrapping)
+//! f32 values --fixed point, 25 bits--> row prefix sums of (q, count) packed and of q^2 (u64, wrapping)
 //!            --2 reads a row of the disk--> sums of the window --integers--> mean, sigma
 //! ```
 //!
 //! The disk is `|u| <= r` on texel centres. Texels that the mask leaves out, and everything beyond the border, take no
-//! part. Sums are integers, so they do not depend on the order and `n sum(q^2) - (sum q)^2` is exact: sigma is right
-//! to the fixed point even where it is 10^-4 of the mean, and 0 where the window is constant.
+//! part. Sums are integers, so they do not depend on the order, and the sum of squares about an integer near the mean
+//! has no cancellation: sigma is right to the fixed point even where it is 10^-4 of the mean, and 0 where the window is constant.
 //!
 //! Rows are worked on in bands, columns in blocks that fit the second-level cache: 20 bytes a texel of one band and
 //! block per thread.
@@ -29,12 +29,15 @@ pub struct LocalStatistics {
     pub covered: Mask,
 }
 
+/// Largest radius of a disk, texels: beyond it 64-bit sums would cost precision.
+pub const MAX_RADIUS_PX: u32 = 1024;
+
 /// Rows of output that a band computes at once.
 const BAND: usize = 128;
 /// Columns of output in a block.
-const BLOCK: usize = 512;
+const BLOCK: usize = 256;
 /// Columns summed in registers.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
 /// Half widths of the rows of a disk: `floor(sqrt(r^2 - dy^2))` for dy = -r..=r.
 fn half_widths(radius: usize) -> Vec<usize> {
@@ -50,11 +53,12 @@ fn half_widths(radius: usize) -> Vec<usize> {
 pub fn local_statistics(map: &Map, mask: &Mask, radius_px: u32) -> Result<LocalStatistics, HemoglobinError> {
     super::check_map("map", map, mask)?;
     let (width, height) = (map.width as usize, map.height as usize);
-    if radius_px == 0 || radius_px > map.width.max(map.height) {
+    let largest = map.width.max(map.height).min(MAX_RADIUS_PX);
+    if radius_px == 0 || radius_px > largest {
         return Err(HemoglobinError {
             at: "radius".into(),
             found: format!("{radius_px} texels"),
-            expected: format!("1 to {}, the larger side of the map", map.width.max(map.height)),
+            expected: format!("1 to {largest} (at most the larger side of the map and {MAX_RADIUS_PX})"),
         });
     }
     let radius = radius_px as usize;
@@ -65,9 +69,11 @@ pub fn local_statistics(map: &Map, mask: &Mask, radius_px: u32) -> Result<LocalS
             (low, high) = (low.min(*v), high.max(*v));
         }
     }
-    // A window's sum of squares must fit 64 bits: 25 bits a value up to a radius of 72 texels.
+    // A window's sum of squares must fit 64 bits, and so must its sum beside its count: 25 bits a value up to a radius
+    // of 72 texels, 20 at the largest.
     let window: u64 = spans.iter().map(|w| 2 * *w as u64 + 1).sum();
-    let bits = (window.leading_zeros() / 2).min(31);
+    let window_bits = u64::BITS - window.leading_zeros();
+    let bits = ((64 - window_bits) / 2).min(64 - 2 * window_bits);
     let levels = ((1u64 << bits) - 1) as f64;
     let range = (f64::from(high) - f64::from(low)).max(0.0);
     // No mapped texel, or all equal: any step represents them.
@@ -78,7 +84,16 @@ pub fn local_statistics(map: &Map, mask: &Mask, radius_px: u32) -> Result<LocalS
         Map { width: map.width, height: map.height, channels: 1, values: vec![0.0; width * height] };
     let mut deviation = mean.clone();
     let mut covered = Mask { width: map.width, height: map.height, mapped: vec![false; width * height] };
-    let window = Window { map, mask, spans: &spans, radius, low: f64::from(low), to_fixed, step };
+    let window = Window {
+        map,
+        mask,
+        spans: &spans,
+        radius,
+        low: f64::from(low),
+        to_fixed,
+        step,
+        count_shift: 64 - window_bits,
+    };
     mean.values
         .par_chunks_mut(BAND * width)
         .zip(deviation.values.par_chunks_mut(BAND * width))
@@ -103,6 +118,8 @@ struct Window<'a> {
     low: f64,
     to_fixed: f64,
     step: f64,
+    /// The count stands above the sum in packed sums, from this bit.
+    count_shift: u32,
 }
 
 impl Window<'_> {
@@ -124,20 +141,21 @@ impl Window<'_> {
         // the last lanes read inside.
         let padded = columns.next_multiple_of(LANES) + 2 * self.radius + 1;
         let size = (last_row - first_row) * padded;
-        let (mut sums, mut squares, mut counts) = (vec![0u64; size], vec![0u64; size], vec![0u32; size]);
+        let (mut sums, mut squares) = (vec![0u64; size], vec![0u64; size]);
         for row in first_row..last_row {
             let at = (row - first_row) * padded;
-            let (mut sum, mut square, mut count) = (0u64, 0u64, 0u32);
-            for i in 0..padded - 1 {
+            let (mut sum, mut square) = (0u64, 0u64);
+            let texels = row * width..(row + 1) * width;
+            let (values, mapped) = (&self.map.values[texels.clone()], &self.mask.mapped[texels]);
+            let (sums, squares) = (&mut sums[at + 1..at + padded], &mut squares[at + 1..at + padded]);
+            for (i, (out, out2)) in sums.iter_mut().zip(squares).enumerate() {
                 let x = (left + i).wrapping_sub(self.radius);
-                if x < width && self.mask.mapped[row * width + x] {
-                    let value = f64::from(self.map.values[row * width + x]);
-                    let q = ((value - self.low) * self.to_fixed + 0.5) as u64;
-                    sum += q;
+                if x < width && mapped[x] {
+                    let q = ((f64::from(values[x]) - self.low) * self.to_fixed + 0.5) as u64;
+                    sum = sum.wrapping_add(q + (1 << self.count_shift));
                     square = square.wrapping_add(q * q);
-                    count += 1;
                 }
-                (sums[at + i + 1], squares[at + i + 1], counts[at + i + 1]) = (sum, square, count);
+                (*out, *out2) = (sum, square);
             }
         }
         for row in 0..rows {
@@ -151,15 +169,20 @@ impl Window<'_> {
             while x < columns {
                 let sum = disk(&sums[base..], padded, spans, self.radius, x);
                 let square = disk(&squares[base..], padded, spans, self.radius, x);
-                let count = disk(&counts[base..], padded, spans, self.radius, x);
                 for lane in 0..LANES.min(columns - x) {
-                    let n = u64::from(count[lane]);
+                    let n = sum[lane] >> self.count_shift;
                     if n > 0 {
                         let out = row * width + left + x + lane;
-                        let (s, s2) = (u128::from(sum[lane]), u128::from(square[lane]));
-                        let n2 = n as f64 * n as f64;
-                        let variance = (u128::from(n) * s2 - s * s) as f64 / n2;
-                        mean[out] = (self.low + self.step * (sum[lane] as f64 / n as f64)) as f32;
+                        let total = sum[lane] & ((1 << self.count_shift) - 1);
+                        let average = total as f64 / n as f64;
+                        // About an integer near the mean: sum (q - m)^2 is an integer, exact and small.
+                        let m = average as u64;
+                        let rest = (total as f64) - (n * m) as f64;
+                        let about = (square[lane])
+                            .wrapping_sub(m.wrapping_mul(2).wrapping_mul(total))
+                            .wrapping_add(n.wrapping_mul(m.wrapping_mul(m)));
+                        let variance = (about as f64 - rest * rest / n as f64).max(0.0) / n as f64;
+                        mean[out] = (self.low + self.step * average) as f32;
                         deviation[out] = (self.step * variance.sqrt()) as f32;
                         covered[out] = true;
                     }
@@ -171,35 +194,17 @@ impl Window<'_> {
 }
 
 /// Sums over the disk for the texels `x..x + LANES` from prefix sums of `padded` entries a row: two reads a row.
-fn disk<T: Prefix>(prefix: &[T], padded: usize, spans: &[usize], radius: usize, x: usize) -> [T; LANES] {
-    let mut total = [T::default(); LANES];
+/// A window's sum is right even where the prefix wrapped.
+fn disk(prefix: &[u64], padded: usize, spans: &[usize], radius: usize, x: usize) -> [u64; LANES] {
+    let mut total = [0u64; LANES];
     for (half, row) in spans.iter().zip(prefix.chunks_exact(padded)) {
-        let before = &row[x + radius - half..][..LANES];
-        let after = &row[x + radius + half + 1..][..LANES];
+        let before: &[u64; LANES] = row[x + radius - half..].first_chunk().expect("padded rows");
+        let after: &[u64; LANES] = row[x + radius + half + 1..].first_chunk().expect("padded rows");
         for lane in 0..LANES {
-            total[lane] = total[lane].add_difference(after[lane], before[lane]);
+            total[lane] = total[lane].wrapping_add(after[lane].wrapping_sub(before[lane]));
         }
     }
     total
-}
-
-/// Integers of prefix sums: a window's sum is right even where the prefix wrapped.
-trait Prefix: Copy + Default {
-    fn add_difference(self, after: Self, before: Self) -> Self;
-}
-
-impl Prefix for u64 {
-    #[inline(always)]
-    fn add_difference(self, after: Self, before: Self) -> Self {
-        self.wrapping_add(after).wrapping_sub(before)
-    }
-}
-
-impl Prefix for u32 {
-    #[inline(always)]
-    fn add_difference(self, after: Self, before: Self) -> Self {
-        self.wrapping_add(after).wrapping_sub(before)
-    }
 }
 
 #[cfg(test)]
