@@ -21,6 +21,7 @@
 //! ```
 
 pub mod diffusion;
+pub mod fit;
 pub mod gaussians;
 pub mod kernel;
 pub mod medium;
