@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::diffusion::{ExponentialSum, ExponentialTerm};
+use super::diffusion::{ExponentialSum, ExponentialTerm, NormalizedDiffusion};
 use super::gaussians::{GaussianSum, GaussianTerm};
 use super::numerics::{levenberg_marquardt, non_negative_least_squares};
 use super::profile::{Profile, RadialProfile};
@@ -126,6 +126,41 @@ pub fn fit_channel_exponentials(
     Ok((sum, fit.errors[0]))
 }
 
+/// Normalized diffusion with the profile's total and the width that puts the least light in the wrong place.
+///
+/// The published widths were fitted to index-matched media; this is the refit for any other. Also returns the fraction
+/// of misplaced light, by 160 rings.
+pub fn refit_normalized_diffusion(profile: &RadialProfile) -> Result<(NormalizedDiffusion, f64), SkinError> {
+    let total = profile.total();
+    let (low, middle, high) =
+        (profile.sample_radius(1e-4), profile.sample_radius(0.5), profile.sample_radius(1.0 - 1e-6));
+    if !(low > 0.0 && high > low && high.is_finite()) {
+        let found = format!("light from {low} to {high} mm");
+        return Err(SkinError::new("fit.profile", found, "a profile that holds its light in a finite disk"));
+    }
+    let edges: Vec<f64> = (0..=NODES).map(|i| low * (high / low).powf(i as f64 / NODES as f64)).collect();
+    let aim: Vec<f64> = edges.iter().map(|&e| profile.mass_beyond(e)).collect();
+    let misplaced = |log_d: f64| {
+        let candidate = NormalizedDiffusion { albedo: total, d_mm: log_d.exp() };
+        let light: Vec<f64> = edges.iter().map(|&e| candidate.mass_beyond(e)).collect();
+        let rings = (0..NODES).map(|i| (light[i] - light[i + 1] - aim[i] + aim[i + 1]).abs());
+        rings.sum::<f64>() / total
+    };
+    // Golden section: the sum has one valley in the width of a one-parameter family.
+    let ratio = 0.5 * (5f64.sqrt() - 1.0);
+    let (mut a, mut b) = (middle.ln() - 3.0, middle.ln() + 3.0);
+    while b - a > 1e-6 {
+        let (left, right) = (b - ratio * (b - a), a + ratio * (b - a));
+        if misplaced(left) < misplaced(right) {
+            b = right;
+        } else {
+            a = left;
+        }
+    }
+    let log_d = 0.5 * (a + b);
+    Ok((NormalizedDiffusion::new(total, log_d.exp())?, misplaced(log_d)))
+}
+
 struct Fit {
     lengths: Vec<f64>,
     /// By channel, then term.
@@ -193,14 +228,23 @@ fn fit(channels: &[RadialProfile], k: usize, basis: Basis, emphasis: Emphasis) -
         let b = quantile(u_high, f64::max, 0.0).ln() - reach;
         starts.push((0..k).map(|i| a + (b - a) * (i as f64 + 0.5) / k as f64).collect());
     }
-    let mut best: Option<(Vec<f64>, f64)> = None;
+    let mut best = (starts[0].clone(), f64::INFINITY);
     for start in starts {
         let found = levenberg_marquardt(residual, &start, &bounds, 1e-4);
-        if best.as_ref().is_none_or(|(_, cost)| found.1 < *cost) {
-            best = Some(found);
+        if found.1 < best.1 {
+            best = found;
         }
     }
-    let mut logs = best.map(|(logs, _)| logs).unwrap_or_default();
+    // A term that lost its weight has no slope to follow back: the lengths are shaken and searched again.
+    for shake in [0.3, -0.3, 0.8] {
+        let shaken = best.0.iter().enumerate();
+        let start: Vec<f64> = shaken.map(|(i, l)| if i % 2 == 0 { l + shake } else { l - shake }).collect();
+        let found = levenberg_marquardt(residual, &start, &bounds, 1e-4);
+        if found.1 < best.1 {
+            best = found;
+        }
+    }
+    let mut logs = best.0;
     logs.sort_by(f64::total_cmp);
     let lengths: Vec<f64> = logs.iter().map(|l| l.exp()).collect();
 
@@ -276,7 +320,7 @@ fn project(target: &Target, radii: &[f64], lengths: &[f64], basis: Basis) -> (DV
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::skin::diffusion::{BetterDipole, NormalizedDiffusion, StandardDipole};
+    use crate::skin::diffusion::{BetterDipole, StandardDipole};
     use crate::skin::medium::{Medium, SKIN1, rgb_media};
 
     #[test]
@@ -311,6 +355,14 @@ mod tests {
         assert!((a.length_mm - 0.4).abs() < 1e-3 && (b.length_mm - 1.2).abs() < 1e-3, "{sum:?}");
         assert!((a.weight - 0.125).abs() < 1e-3 && (b.weight - 0.375).abs() < 1e-3);
         assert!(error.radial < 1e-3);
+    }
+
+    #[test]
+    fn normalized_diffusion_is_refitted_to_itself() {
+        let burley = NormalizedDiffusion::new(0.5, 0.4).unwrap();
+        let (found, error) = refit_normalized_diffusion(&RadialProfile::NormalizedDiffusion(burley)).unwrap();
+        assert!((found.d_mm - 0.4).abs() < 1e-5 && error < 1e-4, "{found:?} {error}");
+        assert!((found.albedo - 0.5).abs() < 1e-12);
     }
 
     #[test]
