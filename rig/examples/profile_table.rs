@@ -1,30 +1,34 @@
-fn main() {
-    use rubor_rig::skin::monte_carlo::*;
-    let photons: u64 = std::env::args().nth(1).unwrap().parse().unwrap();
-    let t = std::time::Instant::now();
-    let table = AlbedoTable::build(0.0, 1.4, photons, 1).unwrap();
-    println!("table {:?}", t.elapsed());
-    println!("{:?} {:?}", table.result.total, table.result.total_error);
-    for a in [0.958549, 0.838, 0.678] {
-        let t = std::time::Instant::now();
-        let r = PhotonWalk::isotropic(1.4, vec![a], photons, 2).run().unwrap();
-        println!(
-            "walk {a} {:?} {:?} {:?} noise {}",
-            t.elapsed(),
-            r.total,
-            r.total_error,
-            r.ring_error[0].iter().sum::<f64>() / r.total[0]
-        );
-        let r =
-            PhotonWalk { estimator: Estimator::Analog, ..PhotonWalk::isotropic(1.4, vec![a], photons, 2) }
-                .run()
-                .unwrap();
-        println!(
-            "analog {a} {:?} {:?} {:?} noise {}",
-            t.elapsed(),
-            r.total,
-            r.total_error,
-            r.ring_error[0].iter().sum::<f64>() / r.total[0]
-        );
+//! Measures every diffusion profile against photon walks and prints docs/profiles.md's table.
+//!
+//! `cargo run --release -p rubor-rig --example profile_table [REFERENCE_PHOTONS [TABLE_PHOTONS]]`
+
+use rubor_rig::error::SkinError;
+use rubor_rig::skin::accuracy::{AccuracyOptions, accuracy_table, similarity_error};
+use rubor_rig::skin::medium::{SKIN1, rgb_media};
+use rubor_rig::skin::monte_carlo::AlbedoTable;
+
+fn main() -> Result<(), SkinError> {
+    let mut options = AccuracyOptions::default();
+    let mut arguments = std::env::args().skip(1);
+    for photons in [&mut options.reference_photons, &mut options.table_photons] {
+        if let Some(text) = arguments.next() {
+            *photons = text.parse().map_err(|_| SkinError::new("arguments", &text, "a number of photons"))?;
+        }
     }
+    let start = std::time::Instant::now();
+    print!("{}", accuracy_table(options)?);
+
+    println!("\n| similarity, skin1 eta 1.4 | R | G | B |\n| --- | ---: | ---: | ---: |");
+    let table = AlbedoTable::build(0.0, 1.4, options.table_photons, options.seed)?;
+    for anisotropy in [0.5, 0.8, 0.9] {
+        let mut line = format!("| g = {anisotropy} |");
+        for medium in rgb_media(&SKIN1, 1.4)? {
+            let photons = options.reference_photons / 4;
+            let error = similarity_error(&medium, &table, anisotropy, photons, options.seed + 100)?;
+            line += &format!(" {:.1} |", 100.0 * error.relative);
+        }
+        println!("{line}");
+    }
+    eprintln!("{:.1} s with {options:?}", start.elapsed().as_secs_f64());
+    Ok(())
 }

@@ -23,11 +23,16 @@
 //! ```
 
 pub mod chromophores;
+pub mod accuracy;
 pub mod diffusion;
+pub mod fit;
 pub mod gaussians;
 pub mod kernel;
 pub mod medium;
+pub mod model;
 pub mod monte_carlo;
 pub(crate) mod numerics;
 pub mod profile;
+pub mod report;
 pub mod table;
+pub mod transmittance;
