@@ -23,6 +23,8 @@ pub mod deform;
 pub mod error;
 pub mod face_state;
 pub mod head;
+pub mod hemoglobin;
 pub mod landmarks;
 pub mod map;
+pub mod mask;
 pub mod skin;
