@@ -11,14 +11,14 @@ use super::regions::{Regions, above_hairline, through};
 /// Upper and lower border of the brow on the plan: (s, low, high), mm. The head of the brow is upright and soft, the
 /// arch is highest at two thirds, the tail is thin.
 const BROW: [[f32; 3]; 8] = [
-    [9.5, 18.0, 23.6],
-    [13.0, 18.4, 26.2],
-    [20.0, 20.8, 28.6],
-    [30.0, 23.3, 30.0],
-    [40.0, 24.3, 29.8],
-    [48.0, 22.6, 27.2],
-    [57.0, 17.6, 21.0],
-    [64.0, 12.2, 13.8],
+    [9.5, 17.6, 23.2],
+    [13.0, 18.2, 25.6],
+    [20.0, 20.0, 27.6],
+    [30.0, 22.0, 28.8],
+    [40.0, 23.0, 28.6],
+    [48.0, 22.0, 26.6],
+    [56.0, 18.8, 22.2],
+    [63.0, 15.0, 16.8],
 ];
 
 /// One hair's look.
@@ -85,9 +85,8 @@ impl Hairs {
         if beard > 0.01 {
             clear *= 1.0 - self.cropped(place, 0.95, 0.12, beard);
         }
-        let scalp = self.scalp
-            * smoothstep(-1.0, 9.0, above_hairline(plan(place)) + 2.5 * noise(place, 5.0, self.seed ^ 9))
-            * r.scalp;
+        let height = above_hairline(plan(place)) + 2.0 * noise(place, 16.0, self.seed ^ 9);
+        let scalp = self.scalp * smoothstep(-5.0, 14.0, height) * (1.0 - r.ear);
         if scalp > 0.01 {
             clear *= 1.0 - self.cropped(place, 0.62, 0.14, scalp);
         }
@@ -100,11 +99,14 @@ impl Hairs {
         let faded = (radius_mm / spacing_mm / radius).powi(2);
         let mut dots = 0.0f32;
         features(place / spacing_mm, self.seed ^ 5, |h, d| {
-            if unit(h) < 0.9 {
+            // Thinning hair is fewer hairs, not fainter ones.
+            if unit(h) < 1.1 * density {
                 dots = dots.max(smoothstep(1.5 * radius, 0.4 * radius, d.length()));
             }
         });
-        (density * (0.30 + 0.65 * dots * faded.sqrt())).min(0.97)
+        // The tint of roots below the surface, and of hair behind hair where it is dense.
+        let tint = 0.22 * density + 0.42 * density * density;
+        (tint + (0.9 - tint) * dots * faded.sqrt()).min(0.97)
     }
 }
 
@@ -131,7 +133,8 @@ fn brow_hair(stream: &mut Stream) -> (Hair, [Vec2; 4]) {
     // Denser in the body than in head and tail.
     let u = loop {
         let u = stream.range(0.0, 1.0);
-        let density = smoothstep(-0.08, 0.22, u) * smoothstep(1.12, 0.75, u);
+        let (low, high) = brow_borders(BROW[0][0] + (BROW[7][0] - BROW[0][0]) * u);
+        let density = smoothstep(-0.08, 0.22, u) * smoothstep(1.1, 0.8, u) * ((high - low) / 8.5).min(1.0);
         if stream.range(0.0, 1.0) < density {
             break u;
         }
@@ -145,9 +148,9 @@ fn brow_hair(stream: &mut Stream) -> (Hair, [Vec2; 4]) {
     let (next_low, next_high) = brow_borders(s + 1.0);
     let along = (0.5 * (next_low + next_high - low - high)).atan2(1.0).to_degrees();
     let upright = smoothstep(0.26, 0.0, u);
-    let converge = 34.0 * (0.55 - v) * smoothstep(1.0, 0.6, u);
+    let converge = 30.0 * (0.6 - v) * smoothstep(0.9, 0.5, u);
     let angle =
-        along + converge + upright * (62.0 - along) + 8.0 * smoothstep(0.5, 0.2, u) + 7.0 * stream.normal();
+        along + converge + upright * (62.0 - along) + 8.0 * smoothstep(0.5, 0.2, u) + 9.0 * stream.normal();
     let length = (7.4 - 2.6 * upright - 3.0 * smoothstep(0.6, 1.0, u)) * (1.0 + 0.16 * stream.normal());
     // Hairs lie over as they leave the root.
     let curl = -9.0 - 10.0 * upright * stream.range(0.3, 1.0) + 5.0 * stream.normal();

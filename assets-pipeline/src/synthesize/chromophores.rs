@@ -71,14 +71,14 @@ impl Chromophores {
             + 0.06 * r.nose
             + 0.05 * r.cheek_bone
             + 0.10 * r.temple
-            + 0.26 * r.lids
-            + 0.20 * r.under_eye
+            + 0.10 * r.lids
+            + 0.09 * r.under_eye
             + 0.12 * r.eye_corner
-            + 0.20 * r.lip_border
+            + 0.16 * r.lip_border
             + 0.06 * r.upper_lip
             - 0.10 * r.neck
             + 0.05 * r.ear
-            - 0.35 * r.lips
+            - 0.45 * r.lips
             - 0.5 * r.inner;
         let mut fraction = self.melanin * (uneven + regional + 0.10 * cavity).exp();
         let spots = self.freckle_weight(place, r);
@@ -138,14 +138,14 @@ impl Chromophores {
     /// Local mean of the neutral hemoglobin fraction of the dermis.
     pub(crate) fn hemoglobin_mean(&self, place: Vec3, r: &Regions) -> f32 {
         let lobe = (-((place.y + 38.0) / 10.0).powi(2)).exp() * r.ear;
-        let relative = 0.40 * r.cheek
-            + 0.20 * r.cheek_bone
+        let relative = 0.52 * r.cheek
+            + 0.26 * r.cheek_bone
             + 0.16 * r.lower_cheek
             + 0.26 * r.nose
             + 0.38 * r.nose_tip
             + 0.52 * r.nose_wing
             + 0.30 * r.chin
-            + 0.42 * r.ear
+            + 0.55 * r.ear
             + 0.30 * r.ear_rim
             + 0.15 * lobe
             + 0.35 * r.eye_corner
@@ -153,13 +153,13 @@ impl Chromophores {
             + 0.10 * r.glabella
             - 0.16 * r.forehead
             - 0.12 * r.temple
-            - 0.14 * r.lids
+            - 0.06 * r.lids
             + 0.42 * r.lid_edge
             - 0.12 * r.upper_lip
             - 0.12 * r.neck
             - 0.10 * r.scalp;
         let drift = 0.07 * self.noise(place, 32.0, 21) + 0.08 * self.noise(place, 13.0, 22);
-        let red = 1.32 * r.lips + 1.5 * r.inner * (1.0 - r.lips) + 0.10 * r.lip_border;
+        let red = 1.22 * r.lips + 1.2 * r.inner * (1.0 - r.lips) + 0.10 * r.lip_border;
         self.hemoglobin * (relative * (1.0 - r.lips) + drift * (1.0 - 0.6 * r.lips) + red).exp()
     }
 
@@ -190,9 +190,10 @@ impl Chromophores {
         HEMOGLOBIN_SPREAD * (1.0 + 0.3 * r.cheek + 0.2 * r.nose_wing - 0.35 * r.lips - 0.2 * r.forehead)
     }
 
-    /// Neutral hemoglobin volume fraction `H_n`.
-    pub(crate) fn hemoglobin(&self, place: Vec3, r: &Regions) -> f32 {
+    /// Local mean and value of the neutral hemoglobin volume fraction `H_n`.
+    pub(crate) fn hemoglobin_with_mean(&self, place: Vec3, r: &Regions) -> (f32, f32) {
         let variation = (self.hemoglobin_spread(r) * self.mottling(place, r)).max(-0.85);
-        self.hemoglobin_mean(place, r) * (1.0 + variation)
+        let mean = self.hemoglobin_mean(place, r);
+        (mean, mean * (1.0 + variation))
     }
 }

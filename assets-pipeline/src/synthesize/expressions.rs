@@ -9,13 +9,13 @@
 use glam::Vec3;
 use rayon::prelude::*;
 use rubor_rig::head::Distribution;
+use rubor_rig::hemoglobin::{self, HemoglobinError};
 use rubor_rig::map::Map;
+use rubor_rig::mask::Mask;
 
-use super::chromophores::Chromophores;
 use super::noise::{Stream, noise};
 use super::regions::Regions;
-use super::statistics::{LocalStatistics, Sample};
-use super::surface::{Coverage, Site};
+use super::surface::Coverage;
 
 /// Relative change of the mean hemoglobin by region, and how much patchier it becomes.
 struct State {
@@ -176,28 +176,29 @@ fn response(state: &State, index: usize, side: f32, place: Vec3, r: &Regions, se
     ((1.0 + change).max(0.2), 1.0 + (state.patchiness - 1.0) * rise)
 }
 
-/// Distributions of all states at the texels of `low`, from the neutral map on `full`.
+/// Neutral and all states as statistics in discs of `radius_px` texels of `coverage`.
+///
+/// The first is named `neutral`: its bias is `mu_n` (`bias_0` of eq. 7.5) and its scale 1, so that who blends them
+/// needs no other map. `hemoglobin` gives the regions, the mean and the value of the neutral map at a place.
 pub(crate) fn distributions(
-    chromophores: &Chromophores,
-    full: &Coverage<'_>,
-    neutral: &Map,
-    low: &Coverage<'_>,
+    coverage: &Coverage<'_>,
+    radius_px: u32,
+    size: u32,
     seed: u32,
 ) -> (Map, Vec<Distribution>) {
     // A quarter of a million texels carry the statistics of any map.
     let stride = (full.resolution() / 512).max(1);
+    hemoglobin: impl Fn(Vec3) -> (Regions, f32, f32) + Sync,
+) -> Result<Vec<Distribution>, HemoglobinError> {
     let mut stream = Stream::new(seed ^ 0x51de);
     let sides: Vec<f32> = STATES.iter().map(|_| (0.045 * stream.normal()).clamp(-0.09, 0.09)).collect();
-    let rows = (0..full.resolution() / stride).collect::<Vec<_>>();
-    let sampled: Vec<(Site, f32, f32)> = rows
-        .par_iter()
-        .flat_map_iter(|row| {
-            let y = row * stride + stride / 2;
-            (0..full.resolution() / stride).filter_map(move |column| {
-                let x = column * stride + stride / 2;
-                let site = full.site(x, y)?;
-                Some((site, full.texel_area(x, y), neutral.texel(x, y)[0]))
-            })
+    let side = coverage.resolution();
+    let sites: Vec<Option<(Vec3, Regions, f32, f32)>> = (0..side * side)
+        .into_par_iter()
+        .map(|i| {
+            let place = coverage.site(i % side, i / side)?.place;
+            let (r, mean, value) = hemoglobin(place);
+            Some((place, r, mean, value))
         })
         .collect();
     let described: Vec<(Vec3, f32, f32, f32, Regions)> = sampled
@@ -253,4 +254,26 @@ pub(crate) fn distributions(
         })
         .collect();
     (neutral_mean, distributions)
+    let mask = Mask { width: side, height: side, mapped: sites.iter().map(Option::is_some).collect() };
+    let map_of = |value: &(dyn Fn(&(Vec3, Regions, f32, f32)) -> f32 + Sync)| Map {
+        width: side,
+        height: side,
+        channels: 1,
+        values: sites.par_iter().map(|s| s.as_ref().map_or(0.0, value)).collect(),
+    };
+    let neutral = hemoglobin::neutral(&map_of(&|(_, _, _, value)| *value), &mask, radius_px, size)?;
+    let unchanged = Distribution {
+        name: "neutral".into(),
+        scale: Map::filled(neutral.mean.width, neutral.mean.height, &[1.0]),
+        bias: neutral.mean.clone(),
+    };
+    let mut all = vec![unchanged];
+    for (index, state) in STATES.iter().enumerate() {
+        let target = map_of(&|(place, r, mean, value)| {
+            let (gain, spread) = response(state, index, sides[index], *place, r, seed);
+            gain * (mean + spread * (value - mean))
+        });
+        all.push(hemoglobin::distribution(state.name, &neutral, &target, &mask, radius_px, size)?);
+    }
+    Ok(all)
 }

@@ -55,6 +55,21 @@ const ROUNDING_MM: f64 = 10.0;
 /// Fewer landmarks than this do not fix an affine map; the bounds of the head are used instead.
 const MIN_LANDMARKS: usize = 6;
 
+/// Diagonal of the radial system for a landmark, mm: how loosely it is followed. Those that people place within a
+/// millimetre are met; those on smooth flesh, or whose place is a matter of taste (a brow can be plucked), only pull.
+fn looseness(name: &str) -> f64 {
+    if name.starts_with("brow") {
+        40.0
+    } else if ["vertex", "trichion", "menton"].contains(&name)
+        || ["zygion", "cheek", "gonion", "ear"].iter().any(|n| name.starts_with(n))
+    {
+        15.0
+    } else {
+        // A whisper of smoothing, so that two landmarks a hair apart do not fold the warp.
+        0.5
+    }
+}
+
 /// Canonical position of a landmark of the left side or of the middle, mm.
 ///
 /// # Panics
@@ -92,10 +107,10 @@ pub(crate) struct FaceSpace {
 impl FaceSpace {
     /// Fits the warp to the landmarks that a head has; without enough of them, to its bounds.
     pub(crate) fn fit(head: &Head) -> Self {
-        let mut pairs: Vec<(DVec3, DVec3)> = Vec::new();
+        let mut pairs: Vec<(DVec3, DVec3, f64)> = Vec::new();
         let mut add = |name: &str, to: Vec3| {
             if let Some(from) = head.landmarks.get(name).filter(|p| p.is_finite()) {
-                pairs.push(((*from * MM_PER_METRE).as_dvec3(), to.as_dvec3()));
+                pairs.push(((*from * MM_PER_METRE).as_dvec3(), to.as_dvec3(), looseness(name)));
             }
         };
         for (name, c) in MIDDLE {
@@ -109,12 +124,14 @@ impl FaceSpace {
     }
 
     /// `None` when the landmarks are too few or lie in a plane.
-    fn from_pairs(pairs: &[(DVec3, DVec3)]) -> Option<Self> {
+    /// `pairs` are places on the head (mm), canonical places and how loosely they are followed.
+    fn from_pairs(pairs: &[(DVec3, DVec3, f64)]) -> Option<Self> {
         let n = pairs.len();
         if n < MIN_LANDMARKS {
             return None;
         }
         let origin = pairs.iter().map(|p| p.0).sum::<DVec3>() / n as f64;
+        let looseness: Vec<f64> = pairs.iter().map(|p| p.2).collect();
         let centres: Vec<DVec3> = pairs.iter().map(|p| p.0 - origin).collect();
         // [K P; P^T 0] [w; a] = [targets; 0], the standard system of radial interpolation with a linear part.
         let mut system = DMatrix::<f64>::zeros(n + 4, n + 4);
@@ -122,8 +139,7 @@ impl FaceSpace {
             for j in 0..n {
                 system[(i, j)] = -rounded_distance(centres[i] - centres[j]);
             }
-            // A whisper of smoothing, so that two landmarks a hair apart do not fold the warp.
-            system[(i, i)] += 0.5;
+            system[(i, i)] += looseness[i];
             for (k, v) in [1.0, centres[i].x, centres[i].y, centres[i].z].into_iter().enumerate() {
                 system[(i, n + k)] = v;
                 system[(n + k, i)] = v;
@@ -133,7 +149,7 @@ impl FaceSpace {
         let mut axes = Vec::with_capacity(3);
         for axis in 0..3 {
             let mut right = DVector::<f64>::zeros(n + 4);
-            for (i, (_, to)) in pairs.iter().enumerate() {
+            for (i, (_, to, _)) in pairs.iter().enumerate() {
                 right[i] = to[axis];
             }
             let solution = lu.solve(&right)?;

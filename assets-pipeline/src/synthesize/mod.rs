@@ -22,7 +22,6 @@ mod noise;
 mod regions;
 mod relief;
 mod specular;
-mod statistics;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -41,6 +40,10 @@ use wrinkles::Wrinkles;
 
 /// Side of the maps of hemoglobin distributions, texels (papers/004 section 7.6).
 pub const DISTRIBUTION_RESOLUTION: u32 = 256;
+/// Side of the maps that local statistics are taken on, texels: they need many values, not their neighbourhood.
+const STATISTICS_RESOLUTION: u32 = 512;
+/// Radius of the disc of local statistics (papers/004 eq. 7.1), mm on the front of the face.
+const STATISTICS_RADIUS_MM: f32 = 8.0;
 /// Side of zone masks, texels.
 pub const MASK_RESOLUTION: u32 = 128;
 /// Side of the maps that [`synthesize`] accepts, texels.
@@ -78,8 +81,8 @@ impl Default for Options {
         Self {
             seed: 1,
             resolution: 2048,
-            melanin: 0.05,
-            hemoglobin: 0.022,
+            melanin: 0.03,
+            hemoglobin: 0.014,
             age_years: 32.0,
             freckles: 0.3,
             moles: 7,
@@ -143,6 +146,9 @@ pub enum SynthesizeError {
         /// Greatest accepted value.
         high: f32,
     },
+    /// The hemoglobin of a state could not be reduced to statistics.
+    #[error("hemoglobin distributions: {0}")]
+    Hemoglobin(#[from] rubor_rig::hemoglobin::HemoglobinError),
     /// There is nothing to draw on.
     #[error(
         "head {head}: found no skin triangle with area in the texture's unit square, expected a part of material skin"
@@ -157,7 +163,8 @@ pub enum SynthesizeError {
 ///
 /// Melanin, hemoglobin and slopes have the resolution of the options; wrinkle slopes, specular and scattering half of
 /// it; distributions [`DISTRIBUTION_RESOLUTION`], zone masks [`MASK_RESOLUTION`]. Texels without skin hold means of
-/// the skin about them. Landmarks that a head lacks are done without; with fewer than six the maps are placed by the
+/// the skin about them. The distributions begin with
+/// one named `neutral`, whose bias is the local mean of the neutral map. Landmarks that a head lacks are done without; with fewer than six the maps are placed by the
 /// head's bounds, which is rough.
 ///
 /// # Errors
@@ -184,7 +191,7 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
         let hair = hairs.cover(site.place, &r);
         let melanin = chromophores.melanin(site.place, &r, relief.cavity);
         let melanin = melanin + hair * (hairs.melanin - melanin);
-        let hemoglobin = chromophores.hemoglobin(site.place, &r) * (1.0 - 0.6 * hair);
+        let hemoglobin = chromophores.hemoglobin_with_mean(site.place, &r).1 * hemoglobin_under_hair(hair);
         let mut gradient = relief.gradient;
         if Wrinkles::reach(site.place) {
             gradient += lasting * wrinkles.gradient(site.place);
@@ -218,6 +225,17 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
         .as_ref()
         .map(|neutral| expressions::distributions(&chromophores, &full, neutral, &low, seed))
         .unzip();
+    let coarse = surface.rasterise(STATISTICS_RESOLUTION);
+    let texel_mm = surface.texel_mm(STATISTICS_RESOLUTION);
+    let radius_px = (STATISTICS_RADIUS_MM / texel_mm).round().clamp(2.0, 64.0) as u32;
+    let coarse_hairs = Hairs::new(options, texel_mm);
+    let distributions =
+        expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |place| {
+            let r = Regions::at(place);
+            let factor = hemoglobin_under_hair(coarse_hairs.cover(place, &r));
+            let (mean, value) = chromophores.hemoglobin_with_mean(place, &r);
+            (r, factor * mean, factor * value)
+        })?;
     let masks = surface.rasterise(MASK_RESOLUTION);
     let zones = masks
         .bake::<12>(&[1; 12], |site| wrinkles::zone_weights(site.place))
@@ -238,6 +256,11 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
         hair: None,
         hair_color_linear: [0.0; 3],
     })
+}
+
+/// What hair leaves of the colour of blood.
+fn hemoglobin_under_hair(hair: f32) -> f32 {
+    1.0 - 0.3 * hair
 }
 
 /// Share of the expression wrinkles that stays on the face at rest.

@@ -78,16 +78,17 @@ const LIP_BOTTOM: [[f32; 2]; 6] =
     [[0.0, -80.6], [5.0, -80.4], [10.0, -79.6], [15.0, -77.9], [20.0, -75.2], [24.0, -72.2]];
 /// Hairline: plan (|s|, y), mm; above it grows scalp hair. It comes down before the ear (sideburn), passes over it
 /// and goes round to the neck.
-const HAIRLINE: [[f32; 2]; 13] = [
+const HAIRLINE: [[f32; 2]; 14] = [
     [0.0, 77.0],
     [30.0, 78.5],
     [52.0, 73.0],
     [66.0, 55.0],
-    [80.0, 38.0],
-    [92.0, 22.0],
-    [99.0, 0.0],
-    [106.0, -18.0],
-    [114.0, 8.0],
+    [80.0, 40.0],
+    [90.0, 24.0],
+    [95.0, 4.0],
+    [98.0, -15.0],
+    [108.0, -19.0],
+    [114.0, 4.0],
     [148.0, 6.0],
     [164.0, -34.0],
     [190.0, -62.0],
@@ -138,12 +139,8 @@ impl Regions {
             * smoothstep(81.0, 76.0, c.z + 0.011 * (c.x - 8.0).max(0.0).powi(2));
         let lips = (front * smoothstep(-0.7, 0.6, lip_depth)).max(behind_lips);
         let lip_border = front * (1.0 - smoothstep(0.0, 1.6, lip_depth.abs())) * (1.0 - behind_lips);
-        let nostril = smoothstep(4.0, 7.0, c.x)
-            * smoothstep(14.0, 11.0, c.x)
-            * smoothstep(-49.0, -46.5, c.y)
-            * smoothstep(-33.0, -38.0, c.y)
-            * smoothstep(97.0, 92.0, c.z)
-            * smoothstep(0.0, 6.0, 92.0 - c.z + (11.0 - c.x));
+        // The opening of the nostril, seen from below, and what lies behind it.
+        let nostril = blob(c, [7.5, -45.0, 91.0], [2.2, 2.6, 5.0]);
         let behind_lids = near_eye * smoothstep(-0.2, -1.2, eye);
 
         let ear = blob(c, [90.0, -10.0, -27.0], [8.5, 26.0, 17.0]);

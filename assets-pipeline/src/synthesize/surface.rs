@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use rubor_rig::deform::{point_normals, vertex_tangents};
 use rubor_rig::head::{Head, MM_PER_METRE, Material};
 use rubor_rig::map::Map;
+use rubor_rig::mask::{Mask, fill_unmapped};
 
 use super::face_space::FaceSpace;
 
@@ -213,16 +214,6 @@ impl Coverage<'_> {
         Some(site_at(t, p))
     }
 
-    /// Area of a texel on the surface relative to the mean of its triangle's texture, mm^2; 0 without skin.
-    pub(crate) fn texel_area(&self, x: u32, y: u32) -> f32 {
-        let index = self.shown[(y * self.resolution + x) as usize];
-        if index == EMPTY {
-            return 0.0;
-        }
-        let t = &self.surface.triangles[index as usize];
-        area(t) / uv_area(t).abs() / (self.resolution as f32 * self.resolution as f32)
-    }
-
     /// Evaluates fields at every texel that shows skin and fills the rest of the maps from the nearest skin.
     /// `evaluate` returns the texels of maps with the given numbers of channels, one after another.
     pub(crate) fn bake<const N: usize>(
@@ -260,9 +251,9 @@ impl Coverage<'_> {
 
     /// Fills texels without skin with means of the skin about them, coarser with distance (pull-push), so that
     /// smaller versions of a map do not bleed.
-    pub(crate) fn fill_empty(&self, map: &mut Map) {
-        let covered: Vec<bool> = self.shown.iter().map(|s| *s != EMPTY).collect();
-        fill_uncovered(&mut map.values, &covered, self.resolution as usize, map.channels as usize);
+    fn fill_empty(&self, map: &mut Map) {
+        let mapped: Vec<bool> = self.shown.iter().map(|s| *s != EMPTY).collect();
+        fill_unmapped(map, &Mask { width: self.resolution, height: self.resolution, mapped });
     }
 }
 
@@ -279,48 +270,4 @@ fn site_at(t: &[Corner; 3], p: Vec2) -> Site {
     let normal = along_tangent.cross(along_bitangent);
     let normal = if normal.dot(face) < 0.0 { -normal } else { normal };
     Site { place: blend(|c| c.place), normal: normal.normalize_or_zero(), along_tangent, along_bitangent }
-}
-
-fn fill_uncovered(values: &mut [f32], covered: &[bool], size: usize, channels: usize) {
-    if size <= 1 {
-        return;
-    }
-    let half = size.div_ceil(2);
-    let mut small = vec![0.0; half * half * channels];
-    let mut small_covered = vec![false; half * half];
-    small.par_chunks_mut(half * channels).zip(small_covered.par_chunks_mut(half)).enumerate().for_each(
-        |(y, (row, row_covered))| {
-            for x in 0..half {
-                let mut count = 0.0;
-                for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    let (fx, fy) = (2 * x + i, 2 * y + j);
-                    if fx < size && fy < size && covered[fy * size + fx] {
-                        count += 1.0;
-                        let at = (fy * size + fx) * channels;
-                        for c in 0..channels {
-                            row[x * channels + c] += values[at + c];
-                        }
-                    }
-                }
-                if count > 0.0 {
-                    row_covered[x] = true;
-                    row[x * channels..(x + 1) * channels].iter_mut().for_each(|v| *v /= count);
-                }
-            }
-        },
-    );
-    if !small_covered.iter().any(|c| *c) {
-        return;
-    }
-    if small_covered.iter().any(|c| !c) {
-        fill_uncovered(&mut small, &small_covered, half, channels);
-    }
-    values.par_chunks_mut(size * channels).enumerate().for_each(|(y, row)| {
-        for x in 0..size {
-            if !covered[y * size + x] {
-                let at = ((y / 2) * half + x / 2) * channels;
-                row[x * channels..(x + 1) * channels].copy_from_slice(&small[at..at + channels]);
-            }
-        }
-    });
 }
