@@ -52,10 +52,13 @@ fn a_set_becomes_a_head_in_metres() {
     assert_eq!(head.mesh.vertices[0].uv.to_array(), [0.0, 1.0]);
 }
 
+/// Name, files (name and text), words of the message.
+type Case<'a> = (&'a str, &'a [(&'a str, &'a str)], &'a [&'a str]);
+
 #[test]
 fn broken_sets_say_file_place_found_and_expected() {
     let short = "v 0 0 0\nv 1 0 0\n";
-    let cases: [(&str, &[(&str, &str)], &[&str]); 8] = [
+    let cases: [Case<'_>; 8] = [
         ("empty-folder", &[], &["no *.obj files"]),
         ("no-neutral", &[("a.obj", NEUTRAL)], &["neutral", "1 OBJ files"]),
         (
