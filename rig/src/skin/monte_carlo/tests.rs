@@ -91,16 +91,16 @@ fn all_light_is_counted_once() {
 #[test]
 fn interpolated_profile_matches_a_walk_of_its_own() {
     // The albedo is no node of the table and the seeds differ.
-    let table = AlbedoTable::build(0.0, 1.4, 60_000, 10).unwrap();
+    let table = AlbedoTable::build(0.0, 1.4, 30_000, 10).unwrap();
     let medium = Medium::new(0.88, 0.17, 1.4).unwrap();
-    let walk = PhotonWalk::isotropic(1.4, vec![medium.albedo()], 240_000, 11).run().unwrap();
+    let walk = PhotonWalk::isotropic(1.4, vec![medium.albedo()], 120_000, 11).run().unwrap();
     let profile = RadialProfile::Tabulated(table.profile(&medium).unwrap());
     let error = walk.compare(0, medium.sigma_t_prime_per_mm(), &profile);
     // The table has a quarter of the photons, so both together have the root of 5 times the walk's noise: anything
     // more would be an error of the interpolation.
     assert!(error.relative < 1.2 * 5f64.sqrt() * error.noise, "{error:?}");
     let total = table.total(medium.albedo()).unwrap();
-    assert!((total - walk.total[0]).abs() < 0.015 * total, "{total} {}", walk.total[0]);
+    assert!((total - walk.total[0]).abs() < 0.02 * total, "{total} {}", walk.total[0]);
 }
 
 #[test]
