@@ -41,9 +41,42 @@ fn total_with_a_refracting_surface_matches_giovanelli() {
 }
 
 #[test]
-fn anisotropic_total_matches_van_de_hulst() {
-    // van de Hulst 1980 by way of Prahl et al. 1989 has a slab; for a half space similarity is the check: strong
-    // forward scattering at a high albedo approaches the reduced medium.
+fn scattered_directions_have_the_mean_cosine_of_henyey_and_greenstein() {
+    let mut random = Random::new(13, 0);
+    let from: (f64, f64, f64) = (0.6, 0.0, -0.8);
+    for g in [-0.5, 0.3, 0.9] {
+        let (mut first, mut second, n) = (0.0, 0.0, 200_000);
+        for _ in 0..n {
+            let (x, y, z) = scatter(from, g, &mut random);
+            assert!((x * x + y * y + z * z - 1.0).abs() < 1e-12);
+            let cos = x * from.0 + y * from.1 + z * from.2;
+            first += cos / n as f64;
+            second += 0.5 * (3.0 * cos * cos - 1.0) / n as f64;
+        }
+        // The moments of Legendre polynomials are g and g^2.
+        assert!((first - g).abs() < 4e-3 && (second - g * g).abs() < 4e-3, "{g}: {first} {second}");
+    }
+}
+
+#[test]
+fn weak_anisotropic_scattering_matches_the_single_scattering_integral() {
+    // At a matched index and a small albedo a: a integral 2 pi p(-mu) mu / (1 + mu) dmu.
+    let (albedo, g) = (1e-4, 0.5f64);
+    let phase = |mu: f64| (1.0 - g * g) / (4.0 * PI * (1.0 + g * g + 2.0 * g * mu).powf(1.5));
+    let rule = gauss_legendre(32);
+    let single: f64 = rule
+        .iter()
+        .map(|(x, w)| (0.5 * (x + 1.0), 0.5 * w))
+        .map(|(mu, w)| w * 2.0 * PI * phase(mu) * mu / (1.0 + mu))
+        .sum();
+    let walk = PhotonWalk { anisotropy: g, ..PhotonWalk::isotropic(1.0, vec![albedo], 200_000, 14) };
+    let result = walk.run().unwrap();
+    let (found, error) = (result.total[0] / albedo, result.total_error[0] / albedo);
+    assert!((found - single).abs() < 4.0 * error + 1e-3 * single, "{found} +- {error}, exact {single}");
+}
+
+#[test]
+fn forward_scattering_approaches_its_reduced_medium_in_total() {
     let walk = PhotonWalk {
         anisotropy: 0.8,
         rings: Rings { outer: 2000.0, ..Rings::default() },
