@@ -92,10 +92,10 @@ fn fit_to_skin_is_at_least_as_close_as_table_6_1() {
     let fitted = fit_artist(&grid, &exact);
     assert!(squares(&fitted) < table, "{} {table}", squares(&fitted));
     // No other falloff and strength of the family is closer.
-    for c in 0..3 {
+    for (c, exact) in exact.iter().enumerate() {
         let own = |artist: &ArtistKernel| {
             let half = artist.kernel(&grid).half(c);
-            (&exact[c] - grid.separable_quadrant(&half)).norm_squared()
+            (exact - grid.separable_quadrant(&half)).norm_squared()
         };
         let best = own(&fitted);
         for i in 0..400 {
