@@ -149,6 +149,23 @@ fn table_survives_serialisation() {
 }
 
 #[test]
+fn damaged_tables_are_errors() {
+    let good = WalkResult::from(AlbedoTable::build(0.0, 1.3, 500, 12).unwrap());
+    let at = |damage: &dyn Fn(&mut WalkResult)| {
+        let mut result = good.clone();
+        damage(&mut result);
+        AlbedoTable::try_from(result).unwrap_err().at
+    };
+    assert_eq!(at(&|r| r.walk.albedos[0] = 0.5), "table.walk.albedos");
+    assert_eq!(at(&|r| r.walk.eta = 9.0), "walk.eta");
+    assert_eq!(at(&|r| r.edges.truncate(3)), "table.edges");
+    assert_eq!(at(&|r| drop(r.ring_light[2].pop())), "table.ring_light");
+    assert_eq!(at(&|r| r.ring_light[2][3] = f64::NAN), "table.ring_light");
+    assert_eq!(at(&|r| r.total.clear()), "table.total");
+    assert!(AlbedoTable::try_from(good).is_ok());
+}
+
+#[test]
 fn limits_are_errors() {
     let good = PhotonWalk::isotropic(1.4, vec![0.9], 100, 0);
     for albedo in [0.0, 1.0, -0.1, f64::NAN] {
