@@ -28,6 +28,7 @@ mod tests;
 mod wrinkles;
 
 use rubor_rig::head::{Head, Provenance, ProvenanceKind, SkinMaps, WrinkleZone};
+use rubor_rig::skin::chromophores::{MAX_HEMOGLOBIN, MAX_MELANIN};
 use thiserror::Error;
 
 use brows::Hairs;
@@ -181,28 +182,6 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let wrinkles = Wrinkles::new(seed);
     let lasting = lasting_lines(options.age_years);
 
-    let full = surface.rasterise(options.resolution);
-    let texel_mm = surface.texel_mm(options.resolution);
-    let relief = Relief::new(seed, texel_mm, options.age_years);
-    let hairs = Hairs::new(options, texel_mm);
-    let mut detailed = full.bake::<4>(&[1, 1, 2], |site| {
-        let r = Regions::at(site.place);
-        let relief = relief.sample(site, &r);
-        let hair = hairs.cover(site.place, &r);
-        let melanin = chromophores.melanin(site.place, &r, relief.cavity);
-        let melanin = melanin + hair * (hairs.melanin - melanin);
-        let hemoglobin = chromophores.hemoglobin_with_mean(site.place, &r).1 * hemoglobin_under_hair(hair);
-        let mut gradient = relief.gradient;
-        if Wrinkles::reach(site.place) {
-            gradient += lasting * wrinkles.gradient(site.place);
-        }
-        let [x, y] = site.slopes(gradient);
-        [melanin.clamp(0.0, 0.5), hemoglobin.clamp(0.0, 0.32), x, y]
-    });
-    let slopes = detailed.pop();
-    let hemoglobin = detailed.pop();
-    let melanin = detailed.pop();
-
     let half = surface.rasterise((options.resolution / 2).max(*RESOLUTIONS.start()));
     let texel_mm = surface.texel_mm(half.resolution());
     let half_relief = Relief::new(seed, texel_mm, options.age_years);
@@ -220,6 +199,30 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let specular = broad.pop();
     let wrinkle_slopes = broad;
 
+    let full = surface.rasterise(options.resolution);
+    let texel_mm = surface.texel_mm(options.resolution);
+    let relief = Relief::new(seed, texel_mm, options.age_years);
+    let hairs = Hairs::new(options, texel_mm);
+    let mut detailed = full.bake::<4>(&[1, 1, 2], |site| {
+        let r = Regions::at(site.place);
+        let relief = relief.sample(site, &r);
+        let hair = hairs.cover(site.place, &r);
+        let melanin = chromophores.melanin(site.place, &r, relief.cavity);
+        let melanin = melanin + hair * (hairs.melanin - melanin);
+        let (_, hemoglobin) = chromophores.hemoglobin_with_mean(site.place, &r);
+        let hemoglobin = hemoglobin_under_hair(hemoglobin, hair);
+        let [mut x, mut y] = site.slopes(relief.gradient);
+        if let Some(map) = wrinkle_slopes.first() {
+            // Both maps have the same texture frame, so slopes simply add.
+            x += lasting * map.sample(site.uv.x, site.uv.y, 0);
+            y += lasting * map.sample(site.uv.x, site.uv.y, 1);
+        }
+        [melanin.clamp(0.0, MAX_MELANIN as f32), hemoglobin.clamp(0.0, MAX_HEMOGLOBIN as f32), x, y]
+    });
+    let slopes = detailed.pop();
+    let hemoglobin = detailed.pop();
+    let melanin = detailed.pop();
+
     let coarse = surface.rasterise(STATISTICS_RESOLUTION);
     let texel_mm = surface.texel_mm(STATISTICS_RESOLUTION);
     let radius_px = (STATISTICS_RADIUS_MM / texel_mm).round().clamp(2.0, 64.0) as u32;
@@ -227,9 +230,10 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let distributions =
         expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |place| {
             let r = Regions::at(place);
-            let factor = hemoglobin_under_hair(coarse_hairs.cover(place, &r));
+            let hair = coarse_hairs.cover(place, &r);
             let (mean, value) = chromophores.hemoglobin_with_mean(place, &r);
-            (r, factor * mean, factor * value)
+            let seen = |h| hemoglobin_under_hair(h, hair);
+            (r, seen(mean), seen(value))
         })?;
     let masks = surface.rasterise(MASK_RESOLUTION);
     let zones = masks
@@ -241,9 +245,9 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     Ok(SkinMaps { melanin, hemoglobin, distributions, slopes, wrinkle_slopes, zones, specular, scattering })
 }
 
-/// What hair leaves of the colour of blood.
-fn hemoglobin_under_hair(hair: f32) -> f32 {
-    1.0 - 0.3 * hair
+/// Hemoglobin fraction seen under hair: hair has none, and any would turn its brown red in the look-up.
+fn hemoglobin_under_hair(hemoglobin: f32, hair: f32) -> f32 {
+    hemoglobin * (1.0 - 0.9 * hair)
 }
 
 /// Share of the expression wrinkles that stays on the face at rest.
