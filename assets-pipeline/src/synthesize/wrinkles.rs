@@ -196,7 +196,7 @@ fn forehead(pen: &mut Pen) {
                 })
                 .collect();
             let share = ((to - from) / 45.0).clamp(0.6, 1.0);
-            pen.draw(&knots, depth * share, 1.15, [0.34, 0.24]);
+            pen.draw(&knots, depth * share, 1.2, [0.28, 0.2]);
             // A fine companion beside part of it.
             if pen.stream.range(0.0, 1.0) < 0.6 {
                 let up =
@@ -317,7 +317,7 @@ fn nasolabial(pen: &mut Pen, side: f32) {
         .collect();
     // The cheek rolls over the fold; the lip side stays flat. Downwards along the line, the cheek of the left side
     // is on the left.
-    let roll = if side > 0.0 { [0.4, 0.06] } else { [0.06, 0.4] };
+    let roll = if side > 0.0 { [0.22, 0.04] } else { [0.04, 0.22] };
     pen.draw(&knots, 1.15, 2.7, roll);
     // It is deepest at the wing of the nose and runs out below the mouth.
     if let Some(fold) = pen.grooves.last_mut() {
@@ -325,7 +325,7 @@ fn nasolabial(pen: &mut Pen, side: f32) {
     }
     let outer = [[31.0, -47.0], [36.0, -55.0], [39.0, -64.0], [40.0, -73.0]]
         .map(|[s, y]| Vec2::new(side * (s + shift), y + 0.5 * pen.stream.normal()));
-    pen.draw(&outer, 0.36, 1.5, roll);
+    pen.draw(&outer, 0.22, 1.6, roll);
 }
 
 /// The groove between lower lip and chin.
