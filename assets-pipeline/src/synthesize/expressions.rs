@@ -188,6 +188,9 @@ fn response(state: &State, index: usize, side: f32, place: Vec3, r: &Regions, se
     ((1.0 + state.strength * change).max(0.25), 1.0 + (state.patchiness - 1.0) * rise)
 }
 
+/// Place, regions, mean and value of the neutral map at a texel.
+type Neutral = (Vec3, Regions, f32, f32);
+
 /// Neutral and all states as statistics in discs of `radius_px` texels of `coverage`.
 ///
 /// The first is named `neutral`: its bias is `mu_n` (`bias_0` of eq. 7.5) and its scale 1, so that who blends them
@@ -202,7 +205,7 @@ pub(crate) fn distributions(
     let mut stream = Stream::new(seed ^ 0x51de);
     let sides: Vec<f32> = STATES.iter().map(|_| (0.045 * stream.normal()).clamp(-0.09, 0.09)).collect();
     let side = coverage.resolution();
-    let sites: Vec<Option<(Vec3, Regions, f32, f32)>> = (0..side * side)
+    let sites: Vec<Option<Neutral>> = (0..side * side)
         .into_par_iter()
         .map(|i| {
             let place = coverage.site(i % side, i / side)?.place;
@@ -211,7 +214,7 @@ pub(crate) fn distributions(
         })
         .collect();
     let mask = Mask { width: side, height: side, mapped: sites.iter().map(Option::is_some).collect() };
-    let map_of = |value: &(dyn Fn(&(Vec3, Regions, f32, f32)) -> f32 + Sync)| Map {
+    let map_of = |value: &(dyn Fn(&Neutral) -> f32 + Sync)| Map {
         width: side,
         height: side,
         channels: 1,

@@ -89,9 +89,9 @@ fn ramps(cell: [i32; 3], f: Vec3, seed: u32) -> ([[f32; 8]; 3], [f32; 8]) {
     for h in &mut h {
         *h = settle(*h);
     }
-    for axis in 0..3 {
-        for i in 0..8 {
-            g[axis][i] = ((h[i] >> (10 * axis)) & 1023) as i32 as f32 * (2.0 / 1023.0) - 1.0;
+    for (axis, g) in g.iter_mut().enumerate() {
+        for (g, h) in g.iter_mut().zip(h) {
+            *g = ((h >> (10 * axis)) & 1023) as i32 as f32 * (2.0 / 1023.0) - 1.0;
         }
     }
     for i in 0..8 {
@@ -144,8 +144,8 @@ pub(crate) fn features(p: Vec3, seed: u32, mut visit: impl FnMut(u32, Vec3)) {
     for k in 0..3 {
         for j in 0..3 {
             let share_yz = shares[j][1] ^ shares[k][2];
-            for i in 0..3 {
-                let h = settle(shares[i][0] ^ share_yz);
+            for (i, share) in shares.iter().enumerate() {
+                let h = settle(share[0] ^ share_yz);
                 let corner = Vec3::new(i as f32, j as f32, k as f32) - 0.5;
                 visit(h.wrapping_mul(0x9e37_79b1), f - corner - lattice_gradient(h) * 0.5);
             }

@@ -92,6 +92,7 @@ impl Wrinkles {
     }
 
     /// Height of the wrinkled skin over the smooth one at full strength, mm.
+    #[cfg(test)]
     pub(crate) fn height_mm(&self, place: Vec3) -> f32 {
         self.height_on_plan(plan(place))
     }
@@ -111,7 +112,7 @@ impl Wrinkles {
         height + self.chin_dimples_mm(p)
     }
 
-    /// Gradient of [`Self::height_mm`] in canonical space.
+    /// Gradient of the height (mm) of the wrinkled skin over the smooth one at full strength, in canonical space.
     pub(crate) fn gradient(&self, place: Vec3) -> Vec3 {
         let p = plan(place);
         if self.lines.is_empty_about(p) && chin_weight(p) <= 0.0 {
