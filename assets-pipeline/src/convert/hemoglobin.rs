@@ -144,8 +144,11 @@ pub fn read_manifest(file: &Path) -> Result<HemoglobinManifest, ConvertError> {
     })
 }
 
-/// A map of volume fractions with its mask and the number of texels that were clamped.
-fn read_fractions(file: &Path, calibration: Calibration) -> Result<(Map, Mask, usize), ConvertError> {
+/// A map of volume fractions with its mask and the number of texels that were clamped to 0..0.32.
+///
+/// # Errors
+/// An image that is not grey or not finite where mapped; a calibration that is not finite.
+pub fn read_fractions(file: &Path, calibration: Calibration) -> Result<(Map, Mask, usize), ConvertError> {
     if !(calibration.gain.is_finite() && calibration.offset.is_finite()) {
         let found = format!("gain {}, offset {}", calibration.gain, calibration.offset);
         return Err(ConvertError::argument(file.display().to_string(), found, "finite numbers"));

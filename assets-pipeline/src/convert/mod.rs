@@ -10,6 +10,7 @@
 pub mod chromophores;
 pub mod hemoglobin;
 pub mod normals;
+pub mod transfer;
 
 use rubor_rig::hemoglobin::HemoglobinError;
 

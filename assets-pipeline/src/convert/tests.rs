@@ -54,9 +54,10 @@ fn a_manifest_of_mixed_files_becomes_distributions() {
         // 8 bits of 0..0.32 are steps of 0.00126, a tenth of the deviation: 1 % of the scale.
         let tolerance = if d.name == "anger-8" { 0.03 } else { 1e-3 };
         assert_eq!((d.scale.width, d.scale.height), (32, 32));
-        for (s, b) in d.scale.values.iter().zip(&d.bias.values) {
+        for (i, (s, b)) in d.scale.values.iter().zip(&d.bias.values).enumerate() {
             assert!((s - 2.0).abs() < 2.0 * tolerance, "{} scale {s}", d.name);
-            assert!((b - 0.08).abs() < 1e-3, "{} bias {b}", d.name);
+            let expected = 0.08 + 2.0 * (maps.neutral_mean.values[i] - 0.05);
+            assert!((b - expected).abs() < 0.02 * tolerance, "{} bias {b}, {expected}", d.name);
         }
     }
     let written = hemoglobin::write(&maps, &folder.join("out")).unwrap();
@@ -119,7 +120,8 @@ fn albedo_goes_to_chromophores_and_back() {
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;
     assert!(mean < 0.3, "{mean}");
     for (a, b) in melanin.values.iter().zip(&found.melanin.values) {
-        assert!((a / b - 1.0).abs() < 0.15, "{a} {b}");
+        // Pale skin hardly shows its melanin: a code of 8 bits is 1e-3 of it.
+        assert!((a - b).abs() < 0.05 * a + 1.2e-3, "{a} {b}");
     }
 }
 
