@@ -14,7 +14,7 @@ use rubor_rig::mask::Mask;
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file cannot be opened, read or written.
-    #[error("{}: {source}", file.display())]
+    #[error("{}: cannot be read or written", file.display())]
     Io {
         /// The file.
         file: PathBuf,

@@ -24,18 +24,18 @@ const LOOKUP_SIZE: u32 = 128;
 
 /// Arguments of `rubor maps`.
 #[derive(Debug, Args)]
-pub struct MapsArgs {
+pub(crate) struct MapsArgs {
     /// What to do.
     #[command(subcommand)]
-    pub command: MapsCommand,
+    pub(crate) command: MapsCommand,
     /// Print the result as JSON.
     #[arg(long, global = true)]
-    pub json: bool,
+    pub(crate) json: bool,
 }
 
 /// Subcommands of `rubor maps`.
 #[derive(Debug, Subcommand)]
-pub enum MapsCommand {
+pub(crate) enum MapsCommand {
     /// Scale and bias of hemoglobin distributions from measured maps
     Hemoglobin(HemoglobinArgs),
     /// Melanin and hemoglobin maps from an albedo texture
@@ -52,7 +52,7 @@ pub enum MapsCommand {
 
 /// Unit names as arguments.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum UnitArg {
+pub(crate) enum UnitArg {
     /// White is the largest fraction of the model, 0.32
     Normalized,
     /// Volume fraction of the dermis
@@ -73,64 +73,64 @@ impl From<UnitArg> for HemoglobinUnit {
 
 /// Arguments of `rubor maps hemoglobin`.
 #[derive(Debug, Args)]
-pub struct HemoglobinArgs {
+pub(crate) struct HemoglobinArgs {
     /// Manifest (JSON) that names all maps; the other arguments are then not needed
     #[arg(long, conflicts_with_all = ["neutral", "target"])]
-    pub manifest: Option<PathBuf>,
+    pub(crate) manifest: Option<PathBuf>,
     /// Neutral hemoglobin map (PNG, TIFF or EXR)
     #[arg(long, required_unless_present = "manifest")]
-    pub neutral: Option<PathBuf>,
+    pub(crate) neutral: Option<PathBuf>,
     /// NAME=FILE of an expression or condition; repeat for more
     #[arg(long, value_name = "NAME=FILE")]
-    pub target: Vec<String>,
+    pub(crate) target: Vec<String>,
     /// Image whose white is skin
     #[arg(long)]
-    pub mask: Option<PathBuf>,
+    pub(crate) mask: Option<PathBuf>,
     /// Unit of the values
     #[arg(long, value_enum, default_value = "normalized")]
-    pub unit: UnitArg,
+    pub(crate) unit: UnitArg,
     /// Factor of calibration
     #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
-    pub gain: f64,
+    pub(crate) gain: f64,
     /// Offset of calibration, after the factor
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    pub offset: f64,
+    pub(crate) offset: f64,
     /// Radius of the window, texels [default: a 64th of the larger side]
     #[arg(long)]
-    pub radius: Option<u32>,
+    pub(crate) radius: Option<u32>,
     /// Side of the results, texels
     #[arg(long, default_value_t = 256)]
-    pub size: u32,
+    pub(crate) size: u32,
     /// Folder for the results
     #[arg(short, long)]
-    pub output: PathBuf,
+    pub(crate) output: PathBuf,
 }
 
 /// Arguments of `rubor maps chromophores`.
 #[derive(Debug, Args)]
-pub struct ChromophoresArgs {
+pub(crate) struct ChromophoresArgs {
     /// Albedo texture or cross-polarised photograph
-    pub albedo: PathBuf,
+    pub(crate) albedo: PathBuf,
     /// Image whose white is skin; alpha applies as well
     #[arg(long)]
-    pub mask: Option<PathBuf>,
+    pub(crate) mask: Option<PathBuf>,
     /// The file is linear Rec. 709 [default: sRGB for integers, linear for floats]
     #[arg(long)]
-    pub linear: bool,
+    pub(crate) linear: bool,
     /// Factor that brings the values to reflectance
     #[arg(long, default_value_t = 1.0)]
-    pub gain: f32,
+    pub(crate) gain: f32,
     /// CIEDE2000 residual above which a texel is out of gamut
     #[arg(long, default_value_t = DEFAULT_GAMUT_THRESHOLD)]
-    pub threshold: f32,
+    pub(crate) threshold: f32,
     /// Folder for the results
     #[arg(short, long)]
-    pub output: PathBuf,
+    pub(crate) output: PathBuf,
 }
 
 /// What `rubor maps normals` makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum NormalsTarget {
+pub(crate) enum NormalsTarget {
     /// Partial derivative slopes of a normal map
     Slopes,
     /// A normal map of slopes (floats)
@@ -141,52 +141,52 @@ pub enum NormalsTarget {
 
 /// Arguments of `rubor maps normals`.
 #[derive(Debug, Args)]
-pub struct NormalsArgs {
+pub(crate) struct NormalsArgs {
     /// Normal map, or slopes as floats
-    pub input: PathBuf,
+    pub(crate) input: PathBuf,
     /// What to make
     #[arg(long, value_enum)]
-    pub to: NormalsTarget,
+    pub(crate) to: NormalsTarget,
     /// Base normal map of a difference
     #[arg(long, required_if_eq("to", "difference"))]
-    pub base: Option<PathBuf>,
+    pub(crate) base: Option<PathBuf>,
     /// Green grows downwards (DirectX)
     #[arg(long)]
-    pub directx: bool,
+    pub(crate) directx: bool,
     /// Value of the largest code [default: the largest value of the map]
     #[arg(long)]
-    pub range: Option<f32>,
+    pub(crate) range: Option<f32>,
     /// Bits of a PNG or integer TIFF: 8 or 16
     #[arg(long, default_value_t = 16)]
-    pub bits: u32,
+    pub(crate) bits: u32,
     /// Result; `.exr` holds the values themselves
     #[arg(short, long)]
-    pub output: PathBuf,
+    pub(crate) output: PathBuf,
 }
 
 /// Arguments of `rubor maps transfer`.
 #[derive(Debug, Args)]
-pub struct TransferArgs {
+pub(crate) struct TransferArgs {
     /// Folder of the giver as written by `rubor maps hemoglobin`
     #[arg(long)]
-    pub from: PathBuf,
+    pub(crate) from: PathBuf,
     /// Neutral mean of the receiver (`neutral_mean.exr`)
     #[arg(long)]
-    pub to_mean: PathBuf,
+    pub(crate) to_mean: PathBuf,
     /// JSON list of {"receiver": [u, v], "giver": [u, v]}; without it both share one layout
     #[arg(long)]
-    pub correspondences: Option<PathBuf>,
+    pub(crate) correspondences: Option<PathBuf>,
     /// How the bias crosses to another level of blood
     #[arg(long, value_enum, default_value = "ratio")]
-    pub bias: BiasArg,
+    pub(crate) bias: BiasArg,
     /// Folder for the results
     #[arg(short, long)]
-    pub output: PathBuf,
+    pub(crate) output: PathBuf,
 }
 
 /// Bias modes as arguments.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum BiasArg {
+pub(crate) enum BiasArg {
     /// The same percentage
     Ratio,
     /// The same amount
@@ -197,39 +197,39 @@ pub enum BiasArg {
 
 /// Arguments of `rubor maps compare`.
 #[derive(Debug, Args)]
-pub struct CompareArgs {
+pub(crate) struct CompareArgs {
     /// Neutral map
     #[arg(long)]
-    pub neutral: PathBuf,
+    pub(crate) neutral: PathBuf,
     /// Expression or condition map of the same size
     #[arg(long)]
-    pub target: PathBuf,
+    pub(crate) target: PathBuf,
     /// Unit of the values
     #[arg(long, value_enum, default_value = "normalized")]
-    pub unit: UnitArg,
+    pub(crate) unit: UnitArg,
     /// Radius of the window, texels
     #[arg(long)]
-    pub radius: u32,
+    pub(crate) radius: u32,
     /// Side of the distribution, texels
     #[arg(long, default_value_t = 256)]
-    pub size: u32,
+    pub(crate) size: u32,
     /// Grid of regions, along each axis
     #[arg(long, default_value_t = 4)]
-    pub regions: u32,
+    pub(crate) regions: u32,
     /// Picture: exact, Gaussian, difference x 8, side by side
     #[arg(short, long)]
-    pub output: Option<PathBuf>,
+    pub(crate) output: Option<PathBuf>,
 }
 
 /// Arguments of `rubor maps lookup`.
 #[derive(Debug, Args)]
-pub struct LookupArgs {
+pub(crate) struct LookupArgs {
     /// Texels along each axis
     #[arg(long, default_value_t = 128)]
-    pub size: u32,
+    pub(crate) size: u32,
     /// `.png` in sRGB or `.exr` linear
     #[arg(short, long)]
-    pub output: PathBuf,
+    pub(crate) output: PathBuf,
 }
 
 /// Runs `rubor maps`.
@@ -237,7 +237,7 @@ pub struct LookupArgs {
 /// # Errors
 /// Input that cannot be used and output that cannot be written; all of them are the user's to mend (exit code 2)
 /// except those of writing.
-pub fn run(arguments: &MapsArgs) -> miette::Result<()> {
+pub(crate) fn run(arguments: &MapsArgs) -> miette::Result<()> {
     let report = match &arguments.command {
         MapsCommand::Hemoglobin(a) => run_hemoglobin(a)?,
         MapsCommand::Chromophores(a) => run_chromophores(a)?,

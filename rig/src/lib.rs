@@ -28,3 +28,4 @@ pub mod landmarks;
 pub mod map;
 pub mod mask;
 pub mod skin;
+pub mod strain;

@@ -120,8 +120,8 @@ fn albedo_goes_to_chromophores_and_back() {
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;
     assert!(mean < 0.3, "{mean}");
     for (a, b) in melanin.values.iter().zip(&found.melanin.values) {
-        // Pale skin hardly shows its melanin: a code of 8 bits is 1e-3 of it.
-        assert!((a - b).abs() < 0.05 * a + 1.2e-3, "{a} {b}");
+        // Pale skin hardly shows its melanin, and least beside much blood: codes of 8 bits leave 2e-3 open.
+        assert!((a - b).abs() < 0.05 * a + 2e-3, "{a} {b}");
     }
 }
 
