@@ -97,7 +97,7 @@ pub fn convert(
         let found = format!("{}x{}", mask.width, mask.height);
         return Err(ConvertError::argument("mask", found, format!("{width}x{height} as the albedo")));
     }
-    if !(gamut_threshold > 0.0) {
+    if gamut_threshold.is_nan() || gamut_threshold <= 0.0 {
         return Err(ConvertError::argument("threshold", gamut_threshold.to_string(), "a positive CIEDE2000"));
     }
     let inverse = SkinInverse::new(lookup);
