@@ -32,3 +32,6 @@ pub mod facial_appearance;
 pub mod import;
 pub mod poly;
 pub mod synthesize;
+
+pub mod convert;
+pub mod image_io;

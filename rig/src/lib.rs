@@ -37,3 +37,4 @@ pub mod mask;
 pub mod names;
 pub mod skin;
 pub mod timeline;
+pub mod strain;

@@ -88,7 +88,7 @@ impl<'a> SkinInverse<'a> {
                 let next = [0, 1].map(|i| (at[i] + step[i] as f32).clamp(0.0, 1.0));
                 let next_error = distance2(lab_at(self.lookup, next));
                 if next_error < error {
-                    improved = error - next_error > 1e-9;
+                    improved = error - next_error > 1e-6;
                     (at, error) = (next, next_error);
                     damping = (damping * 0.2).max(1e-9);
                     break;
