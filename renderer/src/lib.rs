@@ -1,1 +1,3 @@
 //! Draws the state of a face.
+
+pub mod passes;

@@ -1,0 +1,3 @@
+//! Morphological antialiasing.
+
+pub mod lookups;

@@ -1,0 +1,3 @@
+//! The passes of a frame, one folder each.
+
+pub mod antialias;
