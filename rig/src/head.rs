@@ -139,6 +139,9 @@ pub struct SkinMaps {
     pub melanin: Option<Map>,
     /// Hemoglobin volume fraction of the dermis in the neutral state, 0 to 0.32, 1 channel: `H_n`.
     pub hemoglobin: Option<Map>,
+    /// Local mean of the neutral hemoglobin, `mu_n` of papers/004 eq. 7.3, with the disk that the distributions were
+    /// measured with; 1 channel, low resolution. Needed where there are distributions.
+    pub hemoglobin_mean: Option<Map>,
     /// Hemoglobin distributions of expressions and conditions; the neutral one is implied.
     pub distributions: Vec<Distribution>,
     /// Surface slopes (n_x/n_z, n_y/n_z) of pores and fine lines, tangent space, y towards -v (up), 2 channels.
@@ -289,6 +292,7 @@ impl SkinMaps {
         let named = [
             ("melanin", &self.melanin, 1),
             ("hemoglobin", &self.hemoglobin, 1),
+            ("hemoglobin_mean", &self.hemoglobin_mean, 1),
             ("slopes", &self.slopes, 2),
             ("specular", &self.specular, 2),
             ("scattering", &self.scattering, 1),
@@ -300,6 +304,9 @@ impl SkinMaps {
         }
         for (i, map) in self.wrinkle_slopes.iter().enumerate() {
             map.check(&format!("wrinkle_slopes[{i}]"), 2)?;
+        }
+        if self.hemoglobin_mean.is_none() && !self.distributions.is_empty() {
+            return Err(("maps".into(), "distributions".into(), "a hemoglobin_mean map with them"));
         }
         for d in &self.distributions {
             d.scale.check(&format!("distribution {} scale", d.name), 1)?;

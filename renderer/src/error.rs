@@ -1,0 +1,43 @@
+//! Errors of the renderer, in words a person can act on.
+
+/// Why a device or a frame could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// No Vulkan, Metal or DX12 driver answered.
+    #[error(
+        "no graphics adapter found; without a GPU install a software driver (Debian and Ubuntu: mesa-vulkan-drivers)"
+    )]
+    NoAdapter,
+    /// `--adapter` named none of those that exist.
+    #[error("no adapter matches {wanted:?}; there are: {}", found.join(", "))]
+    UnknownAdapter {
+        /// What was asked for.
+        wanted: String,
+        /// Names of those that exist, with their index.
+        found: Vec<String>,
+    },
+    /// The adapter exists but would not open.
+    #[error("adapter {adapter} refused to open a device: {reason}")]
+    Device {
+        /// Name of the adapter.
+        adapter: String,
+        /// What the driver said.
+        reason: String,
+    },
+    /// A size, count or value outside what the device or the method allows.
+    #[error("{what} is {found}; {expected}")]
+    Limit {
+        /// What is limited.
+        what: &'static str,
+        /// What was asked for.
+        found: String,
+        /// The range, and where it comes from.
+        expected: String,
+    },
+    /// The head breaks a rule of [`rubor_rig::head::Head`].
+    #[error(transparent)]
+    Head(#[from] rubor_rig::error::HeadError),
+    /// The device stopped answering or ran out of memory.
+    #[error("the device failed: {0}")]
+    Lost(String),
+}
