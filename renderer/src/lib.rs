@@ -1,3 +1,5 @@
 //! Draws the state of a face.
 
+pub mod error;
+pub mod gpu;
 pub mod passes;

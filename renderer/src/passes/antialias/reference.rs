@@ -4,6 +4,7 @@
 
 use super::lookups::{AreaTable, DIAGONAL_SLOT};
 use super::settings::{BlendSpace, EdgeSource, Encoding, Mode, Settings, Subsample};
+use super::tables::Tables;
 use rayon::prelude::*;
 
 /// An image of RGBA pixels with straight (unassociated) alpha, row 0 first.
@@ -240,15 +241,13 @@ fn diagonal_weights(edges: &Edges, x: isize, y: isize, blocks: [usize; 2], areas
     };
     // Steps along which the stair goes on, whether its end was found, and the first bit of the last place looked at.
     let walk = |stair: &dyn Fn(isize) -> (bool, bool)| {
-        let mut distance = 0;
-        for step in 1..steps as isize {
+        for step in 1..=steps as isize {
             let (riser, tread) = stair(step);
             if !(riser && tread) {
-                return (distance, true, tread);
+                return (step as u32 - 1, true, tread);
             }
-            distance += 1;
         }
-        (distance, false, true)
+        (steps - 1, false, true)
     };
     let mut sum = [0.0; 2];
     let mut add = |area: [f64; 2]| {
@@ -320,24 +319,24 @@ pub fn blending_weights(edges: &Edges, blocks: [usize; 4], areas: &AreaTable, se
     (0..edges.width * edges.height).into_par_iter().map(weights_at).collect()
 }
 
-/// Mixes `from` and `to`; straight alpha weighs colours.
-fn mix(from: [f32; 4], to: [f32; 4], part: f32, settings: &Settings) -> [f32; 4] {
+/// Sum of colours with shares that add up to one. Straight alpha weighs colours; where all are invisible they
+/// count alike.
+fn mix(parts: &[(f32, [f32; 4])], settings: &Settings) -> [f32; 4] {
     let decode = settings.encoding == Encoding::Srgb && settings.blend_space == BlendSpace::Linear;
-    let alpha = from[3] + (to[3] - from[3]) * part;
-    let (a, b) = if alpha > 0.0 {
-        (from[3] * (1.0 - part) / alpha, to[3] * part / alpha)
-    } else {
-        (1.0 - part, part)
-    };
-    let mut color = [0.0, 0.0, 0.0, alpha];
+    let alpha: f32 = parts.iter().map(|(share, color)| share * color[3]).sum();
+    let mut mixed = [0.0, 0.0, 0.0, alpha];
     for channel in 0..3 {
-        color[channel] = if decode {
-            srgb_from_linear(linear_from_srgb(from[channel]) * a + linear_from_srgb(to[channel]) * b)
-        } else {
-            from[channel] * a + to[channel] * b
-        };
+        let sum: f32 = parts
+            .iter()
+            .map(|(share, color)| {
+                let value = if decode { linear_from_srgb(color[channel]) } else { color[channel] };
+                let share = if alpha > 0.0 { share * color[3] / alpha } else { *share };
+                share * value
+            })
+            .sum();
+        mixed[channel] = if decode { srgb_from_linear(sum) } else { sum };
     }
-    color
+    mixed
 }
 
 /// The last step: each pixel takes its share of its neighbours (equation 9.1).
@@ -348,13 +347,10 @@ pub fn blend(picture: &Picture, weights: &[Weights], settings: &Settings) -> Pic
     };
     let blended = |i: usize| -> [f32; 4] {
         let (x, y) = (i % width, i / width);
-        let up = weight(x, y, 0);
-        let down = weight(x, y + 1, 1);
-        let left = weight(x, y, 2);
-        let right = weight(x + 1, y, 3);
-        let color = picture.pixels[i];
+        let (up, down) = (weight(x, y, 0), weight(x, y + 1, 1));
+        let (left, right) = (weight(x, y, 2), weight(x + 1, y, 3));
         if up + down + left + right == 0.0 {
-            return color;
+            return picture.pixels[i];
         }
         let (x, y) = (x as isize, y as isize);
         let vertical = [(down, picture.at(x, y + 1)), (up, picture.at(x, y - 1))];
@@ -367,31 +363,64 @@ pub fn blend(picture: &Picture, weights: &[Weights], settings: &Settings) -> Pic
         } else {
             vertical.to_vec()
         };
-        // The mean of (1 - a) own + a other, weighted by a, equals own and others with these shares.
+        // The mean of (1 - a) own + a other over the lines, weighted by a.
         let sum: f32 = taken.iter().map(|(a, _)| a).sum();
-        let mut result = [0.0; 4];
-        let mut alphas = 0.0;
-        let linear = Settings { encoding: Encoding::Linear, ..*settings };
-        let decode = settings.encoding == Encoding::Srgb && settings.blend_space == BlendSpace::Linear;
-        let decoded = |c: [f32; 4]| {
-            if decode {
-                [linear_from_srgb(c[0]), linear_from_srgb(c[1]), linear_from_srgb(c[2]), c[3]]
-            } else {
-                c
-            }
-        };
-        for (a, other) in taken {
-            let share = a / sum;
-            let color = mix(decoded(color), decoded(other), a, &linear);
-            for channel in 0..3 {
-                result[channel] += share * color[channel] * color[3];
-            }
-            alphas += share * color[3];
-        }
-        result[3] = alphas;
-        let _ = result;
-        color
+        let mut parts = vec![(taken.iter().map(|(a, _)| a / sum * (1.0 - a)).sum(), picture.pixels[i])];
+        parts.extend(taken.iter().map(|(a, other)| (a / sum * a, *other)));
+        mix(&parts, settings)
     };
     let pixels = (0..width * height).into_par_iter().map(blended).collect();
     Picture { width, height, pixels }
+}
+
+/// One sample of a frame, filtered for its place in the pixel.
+///
+/// # Panics
+/// When settings need depth and there is none.
+pub fn filter_sample(
+    picture: &Picture,
+    depth: Option<&[f32]>,
+    subsample: &Subsample,
+    tables: &Tables,
+    settings: &Settings,
+) -> Picture {
+    if settings.mode == Mode::None {
+        return picture.clone();
+    }
+    let edges = detect_edges(picture, depth, settings);
+    let weights = blending_weights(&edges, tables.positions(subsample), &tables.areas, settings);
+    blend(picture, &weights, settings)
+}
+
+/// All samples of a frame, filtered and averaged in light.
+///
+/// # Panics
+/// Without pictures, or when settings need depth and there is none.
+pub fn filter_samples(pictures: &[Picture], frame: u64, tables: &Tables, settings: &Settings) -> Picture {
+    let filtered: Vec<Picture> = pictures
+        .iter()
+        .zip(settings.mode.subsamples(frame))
+        .map(|(picture, subsample)| filter_sample(picture, None, subsample, tables, settings))
+        .collect();
+    average(&filtered, settings)
+}
+
+/// Mean of pictures of the same size, in light.
+///
+/// # Panics
+/// Without pictures.
+pub fn average(pictures: &[Picture], settings: &Settings) -> Picture {
+    let share = 1.0 / pictures.len() as f32;
+    let pixels = (0..pictures[0].pixels.len())
+        .map(|i| {
+            let parts: Vec<_> = pictures.iter().map(|picture| (share, picture.pixels[i])).collect();
+            mix(&parts, settings)
+        })
+        .collect();
+    Picture { pixels, ..pictures[0] }
+}
+
+/// Share of the previous frame (equation 10.6) for speeds in fractions of the image's sides per frame.
+pub fn history_share(speed: f32, previous_speed: f32) -> f32 {
+    0.5 * (1.0 - super::REPROJECTION_WEIGHT * (speed - previous_speed).abs().sqrt()).max(0.0)
 }

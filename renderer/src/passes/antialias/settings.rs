@@ -38,20 +38,20 @@ pub struct Subsample {
 }
 
 const CENTER: Subsample = Subsample { position_px: [0.0, 0.0], blocks: [0, 0, 0, 0] };
-/// Figure 10.11 left: two samples on the falling diagonal of the pixel.
+/// Figure 10.11 left: two samples on the diagonal of the pixel.
 const PAIR: [Subsample; 2] = [
-    Subsample { position_px: [0.25, -0.25], blocks: [1, 1, 1, 0] },
-    Subsample { position_px: [-0.25, 0.25], blocks: [2, 2, 2, 0] },
+    Subsample { position_px: [0.25, 0.25], blocks: [1, 1, 1, 0] },
+    Subsample { position_px: [-0.25, -0.25], blocks: [2, 2, 2, 0] },
 ];
 /// Figure 10.11 right: the pair, moved by an eighth along the other diagonal in each of two frames.
 const QUAD: [[Subsample; 2]; 2] = [
     [
-        Subsample { position_px: [0.375, -0.125], blocks: [5, 3, 1, 3] },
-        Subsample { position_px: [-0.125, 0.375], blocks: [4, 6, 2, 3] },
+        Subsample { position_px: [0.375, 0.125], blocks: [5, 3, 1, 3] },
+        Subsample { position_px: [-0.125, -0.375], blocks: [4, 6, 2, 3] },
     ],
     [
-        Subsample { position_px: [0.125, -0.375], blocks: [3, 5, 1, 4] },
-        Subsample { position_px: [-0.375, 0.125], blocks: [6, 4, 2, 4] },
+        Subsample { position_px: [0.125, 0.375], blocks: [3, 5, 1, 4] },
+        Subsample { position_px: [-0.375, -0.125], blocks: [6, 4, 2, 4] },
     ],
 ];
 
