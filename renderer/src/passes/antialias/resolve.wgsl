@@ -148,9 +148,9 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
         // The largest half.
         textureStore(kept_light, q.p, min(light, vec4(65504.0)));
         textureStore(kept_speed, q.p, vec4(speed, 0.0, 0.0, 0.0));
-        let from = vec2<f32>(q.p) + 0.5 - textureLoad(velocity, q.p, 0).xy;
-        if params.history_valid == 1u && all(from >= vec2(0.0)) && all(from <= vec2<f32>(params.size)) {
-            let previous = previous_at(from);
+        let origin = vec2<f32>(q.p) + 0.5 - textureLoad(velocity, q.p, 0).xy;
+        if params.history_valid == 1u && all(origin >= vec2(0.0)) && all(origin <= vec2<f32>(params.size)) {
+            let previous = previous_at(origin);
             // Equations 10.6 and 10.7.
             let part = 0.5 * max(0.0, 1.0 - REPROJECTION_WEIGHT * sqrt(abs(speed - previous.speed)));
             // What differs by no more than the history's rounding is no difference.
