@@ -35,11 +35,12 @@ fn steps_of(stored: vec4<f32>) -> vec4<i32> {
     if LINEAR_INPUT {
         seen = vec4(srgb_from_linear(stored.rgb), stored.a);
     }
+    let cover = select(1.0, seen.a, STRAIGHT_ALPHA);
     if EDGE_SOURCE == SOURCE_COLOR {
-        seen = vec4(seen.rgb * seen.a, seen.a);
+        seen = vec4(seen.rgb * cover, seen.a);
     } else {
         let luma = 0.2126 * seen.r + 0.7152 * seen.g + 0.0722 * seen.b;
-        seen = vec4(luma * seen.a, 0.0, 0.0, seen.a);
+        seen = vec4(luma * cover, 0.0, 0.0, seen.a);
     }
     return vec4<i32>(round(clamp(seen, vec4(0.0), vec4(BRIGHTEST)) * STEPS));
 }

@@ -67,5 +67,5 @@ fn mixed(color: texture_2d<f32>, p: vec2<i32>, shares: vec4<f32>) -> vec4<f32> {
         plain += share * light.rgb;
         alpha += share * light.a;
     }
-    return vec4(select(plain, sum / alpha, alpha > 0.0), alpha);
+    return vec4(select(plain, sum / alpha, STRAIGHT_ALPHA && alpha > 0.0), alpha);
 }

@@ -39,8 +39,8 @@
 //!   outside of the image counts as unknown.
 //!
 //! # Inputs and outputs
-//! - Colours: any texture that loads as `f32`, one for each of [`Mode::subsamples`], straight alpha, encoded as
-//!   [`Settings::encoding`] says (sRGB by default). Not a number must not occur.
+//! - Colours: any texture that loads as `f32`, one for each of [`Mode::subsamples`], encoded as
+//!   [`Settings::encoding`] says (sRGB by default), with alpha as [`Settings::alpha`] says (straight by default). Not a number must not occur.
 //! - Depth, where [`Settings::needs_depth`]: one for each sample, any monotonic scale.
 //! - Velocity for T2x and 4x: motion since the previous frame in pixels, x right, y down, without jitter; `rg`.
 //! - Output: a storage texture of the format given to [`Antialias::new`], encoded like the input.
@@ -59,7 +59,7 @@ mod settings;
 mod tables;
 
 pub use filter::Filter;
-pub use settings::{BlendSpace, EdgeSource, Encoding, Mode, Predication, Preset, Settings, Subsample};
+pub use settings::{Alpha, BlendSpace, EdgeSource, Encoding, Mode, Predication, Preset, Settings, Subsample};
 pub use tables::Tables;
 
 use crate::gpu::{Gpu, PassTimer};
@@ -585,6 +585,7 @@ impl Kernel {
                 mode.is_temporal(),
             ),
         };
+        let constants = format!("{constants}const STRAIGHT_ALPHA = {};\n", settings.alpha == Alpha::Straight);
         let parts: &[&str] = match self {
             Self::Edges => &[include_str!("edges.wgsl")],
             Self::Weights if dispatch == Dispatch::Tiles => {

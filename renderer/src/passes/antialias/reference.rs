@@ -3,7 +3,7 @@
 //! The image is continued by its border pixels, so outside of it there are no new edges and lines run on.
 
 use super::lookups::{AreaTable, DIAGONAL_SLOT};
-use super::settings::{BlendSpace, EdgeSource, Encoding, Mode, Settings, Subsample};
+use super::settings::{Alpha, BlendSpace, EdgeSource, Encoding, Mode, Settings, Subsample};
 use super::tables::Tables;
 use rayon::prelude::*;
 
@@ -75,10 +75,11 @@ fn feature(color: [f32; 4], settings: &Settings) -> [i32; 4] {
         }
     };
     let [r, g, b, alpha] = encoded;
+    let cover = if settings.alpha == Alpha::Straight { alpha } else { 1.0 };
     let seen = match settings.edges {
-        EdgeSource::Color => [r * alpha, g * alpha, b * alpha, alpha],
+        EdgeSource::Color => [r * cover, g * cover, b * cover, alpha],
         // Equation 9.2.
-        EdgeSource::Luma | EdgeSource::Depth => [(0.2126 * r + 0.7152 * g + 0.0722 * b) * alpha, 0.0, 0.0, alpha],
+        EdgeSource::Luma | EdgeSource::Depth => [(0.2126 * r + 0.7152 * g + 0.0722 * b) * cover, 0.0, 0.0, alpha],
     };
     seen.map(|value| (value.clamp(0.0, BRIGHTEST) * STEPS).round_ties_even() as i32)
 }
@@ -200,6 +201,14 @@ pub(super) fn search_limits(settings: &Settings) -> (u32, u32) {
     if settings.mode == Mode::Mlaa { (limit, limit) } else { (limit - 1, limit) }
 }
 
+/// Distances from (x, y) to the ends of the line of edges through its upper border.
+#[cfg(test)]
+pub(super) fn row_distances(edges: &Edges, x: isize, y: isize, settings: &Settings) -> (u32, u32) {
+    let lines = Lines { edges, turned: false };
+    let (left, right) = search_limits(settings);
+    (lines.distance(x, y, -1, left, true), lines.distance(x, y, 1, right, true))
+}
+
 /// Weight of two packed 16-bit fractions.
 fn unpack(area: u32) -> [f64; 2] {
     [f64::from(area & 0xffff) / 65535.0, f64::from(area >> 16) / 65535.0]
@@ -288,9 +297,12 @@ fn diagonal_weights(edges: &Edges, x: isize, y: isize, blocks: [usize; 2], areas
     sum
 }
 
+/// Lifts sums that are a half but for rounding, so that ties go up as in integers.
+const TIE: f64 = 1e-9;
+
 /// Blending weights of every pixel. `blocks` are places in `areas`, in the order of [`Subsample::blocks`].
 pub fn blending_weights(edges: &Edges, blocks: [usize; 4], areas: &AreaTable, settings: &Settings) -> Vec<Weights> {
-    let byte = |weight: f64| (weight.min(1.0) * 255.0 + 0.5).floor() as u8;
+    let byte = |weight: f64| (weight.min(1.0) * 255.0 + 0.5 + TIE).floor() as u8;
     let (rows, columns) = (Lines { edges, turned: false }, Lines { edges, turned: true });
     let weights_at = |i: usize| -> Weights {
         let (x, y) = ((i % edges.width) as isize, (i / edges.width) as isize);
@@ -330,7 +342,7 @@ fn mix(parts: &[(f32, [f32; 4])], settings: &Settings) -> [f32; 4] {
             .iter()
             .map(|(share, color)| {
                 let value = if decode { linear_from_srgb(color[channel]) } else { color[channel] };
-                let share = if alpha > 0.0 { share * color[3] / alpha } else { *share };
+                let share = if alpha > 0.0 && settings.alpha == Alpha::Straight { share * color[3] / alpha } else { *share };
                 share * value
             })
             .sum();

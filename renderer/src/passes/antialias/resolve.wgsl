@@ -110,11 +110,11 @@ fn previous_at(position_px: vec2<f32>) -> Previous {
     return sum;
 }
 
-// Mean of two straight colours; `part` is the share of the second.
+// Mean of two colours; `part` is the share of the second.
 fn mean(a: vec4<f32>, b: vec4<f32>, part: f32) -> vec4<f32> {
     let alpha = a.a + (b.a - a.a) * part;
     let weighed = a.rgb * (a.a * (1.0 - part)) + b.rgb * (b.a * part);
-    return vec4(select(mix(a.rgb, b.rgb, part), weighed / alpha, alpha > 0.0), alpha);
+    return vec4(select(mix(a.rgb, b.rgb, part), weighed / alpha, STRAIGHT_ALPHA && alpha > 0.0), alpha);
 }
 
 @compute @workgroup_size(8, 8)

@@ -124,6 +124,17 @@ pub enum BlendSpace {
     Stored,
 }
 
+/// What alpha means for the colours beside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Alpha {
+    /// Colours are as they would be at full cover (PNG).
+    #[default]
+    Straight,
+    /// Colours are already multiplied by alpha (EXR, renderers).
+    Associated,
+}
+
 /// Makes colour edges count more where depth jumps too: the threshold is raised everywhere and lowered there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Predication {
@@ -178,6 +189,8 @@ pub struct Settings {
     pub predication: Option<Predication>,
     /// How the colours are stored.
     pub encoding: Encoding,
+    /// What alpha means.
+    pub alpha: Alpha,
     /// Where neighbours are mixed.
     pub blend_space: BlendSpace,
 }
@@ -210,6 +223,7 @@ impl Settings {
             corner_rounding,
             predication: None,
             encoding: Encoding::Srgb,
+            alpha: Alpha::Straight,
             blend_space: BlendSpace::Linear,
         }
     }
