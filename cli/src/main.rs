@@ -1,2 +1,74 @@
 //! The `rubor` command.
-fn main() {}
+//!
+//! Each subcommand is one file: its arguments, its work, its report. What several share:
+//! `inputs` (heads, rigs, sequences), `studio` (shots to scenes), `sequence_job` (frames of a sequence to a folder),
+//! `output` (whole files or none), `failure` (messages and exit codes).
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod adapters;
+mod contact_sheet;
+mod demo;
+mod failure;
+mod import;
+mod inputs;
+mod output;
+mod progress;
+mod render;
+mod schema;
+mod sequence_job;
+mod studio;
+mod video;
+
+/// Faces whose skin changes colour and wrinkles as they act.
+///
+/// Exit codes: 0 done, 1 the job failed, 2 the input or the arguments are wrong.
+#[derive(Parser)]
+#[command(name = "rubor", version, max_term_width = 110)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render the built-in head through six expressions, blush, pallor and exercise
+    Demo(demo::Arguments),
+    /// Render a sequence to frames, a contact sheet, a video and an animated head
+    Render(render::Arguments),
+    /// Make a head from other files
+    Import(import::Arguments),
+    /// List the graphics adapters of this machine
+    Adapters(adapters::Arguments),
+    /// Print the JSON schema of a rig or a sequence
+    Schema(schema::Arguments),
+}
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::Demo(a) => demo::run(&a),
+        Command::Render(a) => render::run(&a),
+        Command::Import(a) => import::run(&a),
+        Command::Adapters(a) => adapters::run(&a),
+        Command::Schema(a) => schema::run(&a),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::from(failure.code)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        super::Arguments::command().debug_assert();
+    }
+}

@@ -300,8 +300,7 @@ impl Gpu {
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|e| RenderError::Lost(e.to_string()))?;
         self.check()?;
-        let bytes =
-            staging.get_mapped_range(..).map_err(|e| RenderError::Lost(e.to_string()))?.to_vec();
+        let bytes = staging.get_mapped_range(..).map_err(|e| RenderError::Lost(e.to_string()))?.to_vec();
         staging.unmap();
         Ok(bytes)
     }

@@ -1,5 +1,6 @@
 //! What a frame shows: heads, camera, lights, surroundings.
 
+use glam::camera::rh::{proj, view};
 use glam::{Mat4, Vec3};
 use rubor_rig::face_state::FaceState;
 
@@ -56,12 +57,12 @@ pub const NEAR_METRES: f32 = 0.01;
 impl Camera {
     /// World to view: right-handed, the camera looks along -Z.
     pub fn view_from_world(&self) -> Mat4 {
-        Mat4::look_at_rh(self.position, self.target, self.up)
+        view::look_at_mat4(self.position, self.target, self.up)
     }
 
     /// View to clip with infinite reversed depth: depth = near / distance, so 1 is near and 0 infinitely far.
     pub fn clip_from_view(&self, aspect: f32) -> Mat4 {
-        Mat4::perspective_infinite_reverse_rh(self.fov_degrees.to_radians(), aspect, NEAR_METRES)
+        proj::directx::perspective_infinite_reverse(self.fov_degrees.to_radians(), aspect, NEAR_METRES)
     }
 }
 

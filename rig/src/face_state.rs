@@ -15,7 +15,7 @@ pub struct FaceState {
     pub distributions: Vec<f32>,
     /// Global factor of hemoglobin (papers/004 section 7.7: 1.27 for anger, 0.81 for fear); 1 is neutral.
     pub hemoglobin_scale: f32,
-    /// Rotation of the head about `head_pivot`.
+    /// Rotation of the head about the origin of its space: where the skull rests on the neck.
     pub head_rotation: Quat,
     /// Translation after the rotation, metres.
     pub head_translation: Vec3,

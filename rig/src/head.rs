@@ -154,6 +154,10 @@ pub struct SkinMaps {
     pub specular: Option<Map>,
     /// Subsurface scattering strength 0 to 1, 1 channel (0 at brows, stubble and nails).
     pub scattering: Option<Map>,
+    /// Share of the skin under short hair that is drawn with it (brows, stubble, cropped scalp), 0 to 1, 1 channel.
+    pub hair: Option<Map>,
+    /// Albedo of that hair, linear Rec. 709.
+    pub hair_color_linear: [f32; 3],
 }
 
 /// A target hemoglobin distribution as local statistics (papers/004 eq. 7.5), low resolution.
@@ -296,6 +300,7 @@ impl SkinMaps {
             ("slopes", &self.slopes, 2),
             ("specular", &self.specular, 2),
             ("scattering", &self.scattering, 1),
+            ("hair", &self.hair, 1),
         ];
         for (name, map, channels) in named {
             if let Some(map) = map {

@@ -1,10 +1,12 @@
 //! The face and its skin as numbers.
 //!
 //! ```text
-//! Head (mesh, shapes, maps) --+
-//! Rig (rig.json) -------------+--> evaluate(time) --> FaceState --> renderer, export
-//! Sequence (sequence.json) ---+                           |
-//!                                                         +--> deform (CPU truth of the kernels)
+//! rig.json -------> expression::Rig ------+
+//! Head (names) ---------------------------+--> bind::BoundRig -----+
+//! sequence.json --> timeline::Sequence ----------------------------+--> evaluate::Evaluator
+//!   (json: every error with file, line, column)                               | at(time)
+//!                                                                             v
+//! Head (points) --> deform (CPU truth of the kernels) <-- FaceState <-- evaluate::Shot --> renderer, export
 //! ```
 //!
 //! Pure CPU: no GPU, no file formats beyond serde.
@@ -18,9 +20,22 @@
 //! assert_eq!(FaceState::neutral(&head).hemoglobin_scale, 1.0);
 //! ```
 
+pub mod bind;
+pub mod color;
 pub mod deform;
 pub mod error;
+pub mod evaluate;
+pub mod expression;
 pub mod face_state;
+pub mod framing;
 pub mod head;
+pub mod json;
 pub mod landmarks;
 pub mod map;
+pub mod names;
+pub mod hemoglobin;
+pub mod landmarks;
+pub mod map;
+pub mod mask;
+pub mod skin;
+pub mod timeline;

@@ -1,3 +1,13 @@
-//! The passes of a frame, one folder each.
+//! One folder a pass: `mod.rs` with its theory, parameters and recording, its kernels, its tests.
 
 pub mod antialias;
+pub(crate) mod appearance;
+pub(crate) mod compose;
+pub(crate) mod display;
+pub(crate) mod morph;
+pub(crate) mod overlay;
+pub(crate) mod scatter;
+pub(crate) mod shade;
+pub(crate) mod shadow;
+pub(crate) mod surface_frames;
+pub(crate) mod visibility;

@@ -6,8 +6,8 @@
 //!
 //! `RUBOR_RUNS` sets how often each time is taken (default 20, the median counts).
 
-use rubor_renderer::gpu::{Gpu, PassTimer};
-use rubor_renderer::passes::antialias::{
+use rubor_renderer::{Gpu, PassTimer};
+use rubor_renderer::antialias::{
     Antialias, BlendSpace, Dispatch, History, Inputs, Mode, Preset, Settings,
 };
 use std::time::Instant;

@@ -9,7 +9,7 @@ use wgpu::{TextureFormat, TextureUsages};
 /// Filters images one after the other; images of the same size share what the device needs.
 ///
 /// ```no_run
-/// use rubor_renderer::{gpu::Gpu, passes::antialias::{Filter, Settings}};
+/// use rubor_renderer::{Gpu, antialias::{Filter, Settings}};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let gpu = Gpu::new(None)?;
 /// let mut filter = Filter::new(&gpu, Settings::default())?;

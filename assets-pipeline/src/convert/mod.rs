@@ -1,0 +1,4 @@
+//! Conversions between what files hold and what heads hold.
+
+mod bvh;
+pub mod occlusion;

@@ -1,0 +1,92 @@
+//! Maps as images: quantisation to 8 or 16 bits, PNG or JPEG.
+
+use image::codecs::jpeg::JpegEncoder;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use rubor_rig::map::Map;
+
+use crate::error::ExportError;
+use crate::facial_appearance::ChannelLayout;
+
+/// How a map is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapEncoding {
+    /// 8-bit PNG: half a step of 1/255 of the map's range at most.
+    Png8,
+    /// 16-bit PNG: half a step of 1/65535 of the map's range at most.
+    Png16,
+    /// JPEG of this quality, 1 to 100: small, not exact.
+    Jpeg(u8),
+}
+
+/// An encoded image and what turns its texels back into values.
+pub(crate) struct EncodedMap {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) mime_type: &'static str,
+    pub(crate) layout: ChannelLayout,
+    pub(crate) offset: Vec<f32>,
+    pub(crate) scale: Vec<f32>,
+}
+
+/// Encodes a map of one or two channels over its own range of values. Two channels are stacked.
+pub(crate) fn encode_map(what: &str, map: &Map, encoding: MapEncoding) -> Result<EncodedMap, ExportError> {
+    let channels = map.channels as usize;
+    let (offset, scale): (Vec<f32>, Vec<f32>) = (0..channels).map(|c| range(map, c)).unzip();
+    let texel = |c: usize, levels: f32| {
+        let (offset, scale) = (offset[c], scale[c]);
+        let values = map.values.iter().skip(c).step_by(channels);
+        values.map(move |v| if scale > 0.0 { ((v - offset) / scale * levels).round() } else { 0.0 })
+    };
+    let (width, height) = (map.width, map.height * map.channels);
+    let eight = || -> Vec<u8> { (0..channels).flat_map(|c| texel(c, 255.0)).map(|t| t as u8).collect() };
+    let (bytes, mime_type) = match encoding {
+        MapEncoding::Png8 => (encode_png(what, &eight(), width, height, ExtendedColorType::L8)?, "image/png"),
+        MapEncoding::Png16 => {
+            let texels: Vec<u16> = (0..channels).flat_map(|c| texel(c, 65535.0)).map(|t| t as u16).collect();
+            // The encoder takes native byte order and writes the big-endian order of PNG.
+            let bytes = bytemuck::cast_slice(&texels);
+            (encode_png(what, bytes, width, height, ExtendedColorType::L16)?, "image/png")
+        }
+        MapEncoding::Jpeg(quality) => {
+            (encode_jpeg(what, &eight(), width, height, ExtendedColorType::L8, quality)?, "image/jpeg")
+        }
+    };
+    let layout = if channels == 1 { ChannelLayout::First } else { ChannelLayout::Stacked };
+    Ok(EncodedMap { bytes, mime_type, layout, offset, scale })
+}
+
+fn range(map: &Map, channel: usize) -> (f32, f32) {
+    let values = map.values.iter().skip(channel).step_by(map.channels as usize);
+    let (low, high) =
+        values.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    (low, high - low)
+}
+
+pub(crate) fn encode_png(
+    what: &str,
+    texels: &[u8],
+    width: u32,
+    height: u32,
+    color: ExtendedColorType,
+) -> Result<Vec<u8>, ExportError> {
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::Adaptive)
+        .write_image(texels, width, height, color)
+        .map_err(|e| ExportError::Encode { what: what.into(), reason: e.to_string() })?;
+    Ok(bytes)
+}
+
+pub(crate) fn encode_jpeg(
+    what: &str,
+    texels: &[u8],
+    width: u32,
+    height: u32,
+    color: ExtendedColorType,
+    quality: u8,
+) -> Result<Vec<u8>, ExportError> {
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, quality.clamp(1, 100))
+        .write_image(texels, width, height, color)
+        .map_err(|e| ExportError::Encode { what: what.into(), reason: e.to_string() })?;
+    Ok(bytes)
+}

@@ -1,0 +1,149 @@
+//! The vendor extension `RUBOR_facial_appearance`, version 1: what a head holds beyond glTF 2.0.
+//!
+//! It stands in the root `extensions` of the document; its JSON schema is `docs/RUBOR_facial_appearance.schema.json`.
+//! Texel to value: `value = offset + scale * texel`, texel from 0 to 1, one offset and scale a channel.
+
+use std::collections::BTreeMap;
+
+use rubor_rig::head::{Material, Provenance};
+use serde::{Deserialize, Serialize};
+
+/// Name in `extensionsUsed`.
+pub const NAME: &str = "RUBOR_facial_appearance";
+
+/// Version written and read here.
+pub const VERSION: u32 = 1;
+
+/// Root object of the extension.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct FacialAppearance {
+    /// [`VERSION`].
+    pub version: u32,
+    /// Name of the head.
+    pub name: String,
+    /// glTF mesh that is the head.
+    pub mesh: u32,
+    /// Number of points: places of the surface with one normal.
+    pub point_count: u32,
+    /// One a primitive of the mesh, in order.
+    pub parts: Vec<PartEntry>,
+    /// Accessor: ambient visibility of each point, SCALAR, unsigned short normalized.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub occlusion: Option<u32>,
+    /// Anatomical points, metres.
+    #[serde(default)]
+    pub landmarks: BTreeMap<String, [f32; 3]>,
+    /// Maps of the skin.
+    #[serde(default)]
+    pub maps: MapEntries,
+    /// Where geometry and maps come from.
+    #[serde(default)]
+    pub provenance: Vec<Provenance>,
+    /// The rig file, as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig: Option<serde_json::Value>,
+}
+
+/// A part of the mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct PartEntry {
+    /// Name in the source file.
+    pub name: String,
+    /// How it is shaded.
+    pub material: Material,
+    /// Accessor: point of each vertex of the primitive, SCALAR, unsigned short or int.
+    pub points: u32,
+}
+
+/// All maps; those that the head does not have are absent.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub struct MapEntries {
+    /// Volume fraction of melanin in the epidermis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub melanin: Option<MapEntry>,
+    /// Volume fraction of hemoglobin in the dermis, neutral state.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hemoglobin: Option<MapEntry>,
+    /// Local mean of the neutral hemoglobin, which `distributions` are relative to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hemoglobin_mean: Option<MapEntry>,
+    /// Local statistics of other states.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub distributions: Vec<DistributionEntry>,
+    /// Surface slopes, 2 channels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slopes: Option<MapEntry>,
+    /// Slopes of wrinkles, 2 channels.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wrinkle_slopes: Vec<MapEntry>,
+    /// Masks of areas whose wrinkles appear together; up to four share an image.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub zones: Vec<ZoneEntry>,
+    /// Specular intensity and Beckmann roughness, 2 channels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub specular: Option<MapEntry>,
+    /// Strength of subsurface scattering.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scattering: Option<MapEntry>,
+    /// Share of the skin under short hair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hair: Option<MapEntry>,
+    /// Albedo of that hair, linear Rec. 709.
+    pub hair_color_linear: [f32; 3],
+}
+
+/// A map in an image of the document.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct MapEntry {
+    /// glTF image.
+    pub image: u32,
+    /// Where the channels are.
+    pub layout: ChannelLayout,
+    /// Value of texel 0, per channel.
+    pub offset: Vec<f32>,
+    /// Value of texel 1 minus that of texel 0, per channel.
+    pub scale: Vec<f32>,
+}
+
+/// Where the channels of a map are in its image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ChannelLayout {
+    /// One channel: all of a grey image, or the first channel of a colour image.
+    First,
+    /// Two channels as the upper and lower half of a grey image (colour transforms of JPEG would mix them).
+    Stacked,
+    /// The first two channels of a colour image.
+    Interleaved,
+    /// One of the four channels of an RGBA image, named by [`ZoneEntry::channel`].
+    Channel,
+}
+
+/// A hemoglobin distribution.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DistributionEntry {
+    /// Such as `joy`.
+    pub name: String,
+    /// `sigma_i / sigma_n`.
+    pub scale: MapEntry,
+    /// `mu_i`, volume fraction.
+    pub bias: MapEntry,
+}
+
+/// A wrinkle zone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct ZoneEntry {
+    /// Such as `forehead-left`.
+    pub name: String,
+    /// Index into `wrinkleSlopes`.
+    pub wrinkle_map: u32,
+    /// 0 red to 3 alpha.
+    pub channel: u32,
+    /// Image, offset and scale.
+    pub mask: MapEntry,
+}

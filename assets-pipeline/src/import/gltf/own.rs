@@ -1,0 +1,215 @@
+//! Files that carry `RUBOR_facial_appearance`: everything as it was written.
+
+use glam::{Vec2, Vec3};
+use gltf::Semantic;
+use rubor_rig::head::{BlendShape, Distribution, Head, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
+use rubor_rig::map::Map;
+
+use super::document::Document;
+use super::{ImportedHead, accessor};
+use crate::error::ImportError;
+use crate::facial_appearance::{ChannelLayout, FacialAppearance, MapEntries, MapEntry, NAME, VERSION};
+
+pub(super) fn read(document: &Document, extension: &serde_json::Value) -> Result<ImportedHead, ImportError> {
+    let version = &extension["version"];
+    if version.as_u64() != Some(u64::from(VERSION)) {
+        return Err(document.fail(NAME, format!("version {version}"), format!("version {VERSION}")));
+    }
+    let extension: FacialAppearance = serde_json::from_value(extension.clone())
+        .map_err(|e| document.fail(NAME, e.to_string(), "the published schema"))?;
+    let mesh = document
+        .gltf
+        .meshes()
+        .nth(extension.mesh as usize)
+        .ok_or_else(|| document.fail(NAME, format!("mesh {}", extension.mesh), "an existing mesh"))?;
+    let (mesh, shapes) = geometry(document, &mesh, &extension)?;
+    let mut head = Head {
+        name: extension.name,
+        mesh,
+        shapes,
+        maps: maps(document, &extension.maps)?,
+        landmarks: extension.landmarks.into_iter().map(|(name, p)| (name, Vec3::from_array(p))).collect(),
+        provenance: extension.provenance,
+    };
+    if let Some(index) = extension.occlusion {
+        let at = format!("{NAME}, occlusion");
+        let values = accessor::floats::<1>(document, &at, &accessor::by_index(document, &at, index)?)?;
+        head.mesh.occlusion = values.into_iter().map(|[v]| v).collect();
+    }
+    Ok(ImportedHead { head, rig: extension.rig })
+}
+
+fn geometry(
+    document: &Document,
+    source: &gltf::Mesh<'_>,
+    extension: &FacialAppearance,
+) -> Result<(Mesh, Vec<BlendShape>), ImportError> {
+    let names = super::foreign::target_names(source);
+    let count = source.primitives().count();
+    if extension.parts.len() != count {
+        let found = format!("{} parts", extension.parts.len());
+        return Err(document.fail(NAME, found, format!("one for each of the {count} primitives")));
+    }
+    let point_count = extension.point_count as usize;
+    let vertex_count: usize =
+        source.primitives().filter_map(|p| p.get(&Semantic::Positions)).map(|a| a.count()).sum();
+    if point_count > vertex_count {
+        return Err(document.fail(
+            NAME,
+            format!("{point_count} points"),
+            format!("at most {vertex_count}, one a vertex"),
+        ));
+    }
+    let mut mesh = Mesh { points: vec![Vec3::ZERO; point_count], ..Mesh::default() };
+    let mut shapes: Vec<Vec<Option<Vec3>>> = vec![vec![None; point_count]; names.len()];
+    for (i, (primitive, part)) in source.primitives().zip(&extension.parts).enumerate() {
+        let at = |what: &str| format!("mesh {}, primitive {i}, {what}", source.index());
+        let need = |semantic: &Semantic, what: &str| {
+            primitive.get(semantic).ok_or_else(|| document.fail(&at(what), "nothing", "an accessor"))
+        };
+        let positions =
+            accessor::floats::<3>(document, &at("POSITION"), &need(&Semantic::Positions, "POSITION")?)?;
+        let uvs = accessor::floats::<2>(
+            document,
+            &at("TEXCOORD_0"),
+            &need(&Semantic::TexCoords(0), "TEXCOORD_0")?,
+        )?;
+        let indices =
+            primitive.indices().ok_or_else(|| document.fail(&at("indices"), "nothing", "an accessor"))?;
+        let indices = accessor::integers(document, &at("indices"), &indices)?;
+        let points = accessor::by_index(document, &at("points"), part.points)?;
+        let points = accessor::integers(document, &at("points"), &points)?;
+        if points.len() != positions.len() || uvs.len() != positions.len() {
+            let found = format!("{} points and {} texture coordinates", points.len(), uvs.len());
+            return Err(document.fail(&at("attributes"), found, format!("{} of each", positions.len())));
+        }
+        if let Some(p) = points.iter().find(|p| **p as usize >= point_count) {
+            return Err(document.fail(
+                &at("points"),
+                format!("point {p}"),
+                format!("one below {point_count}"),
+            ));
+        }
+        if indices.len() % 3 != 0 || indices.iter().any(|v| *v as usize >= positions.len()) {
+            let found = format!("{} indices up to {:?}", indices.len(), indices.iter().max());
+            return Err(document.fail(
+                &at("indices"),
+                found,
+                format!("triangles of vertices below {}", positions.len()),
+            ));
+        }
+        let first = mesh.vertices.len() as u32;
+        for (v, p) in points.iter().enumerate() {
+            mesh.points[*p as usize] = Vec3::from_array(positions[v]);
+            mesh.vertices.push(Vertex { point: *p, uv: Vec2::from_array(uvs[v]) });
+        }
+        let start = mesh.triangles.len() as u32;
+        mesh.triangles.extend(indices.chunks_exact(3).map(|t| [0, 1, 2].map(|k| first + t[k])));
+        let end = mesh.triangles.len() as u32;
+        mesh.parts.push(Part { name: part.name.clone(), material: part.material, triangles: start..end });
+
+        if primitive.morph_targets().count() != names.len() {
+            let found = format!("{} morph targets", primitive.morph_targets().count());
+            return Err(document.fail(&at("targets"), found, format!("{} as in targetNames", names.len())));
+        }
+        for (t, target) in primitive.morph_targets().enumerate() {
+            let Some(offsets) = target.positions() else { continue };
+            let offsets = accessor::floats::<3>(document, &at(&format!("target {t}")), &offsets)?;
+            for (p, offset) in points.iter().zip(offsets) {
+                // Zeros fill what is not stored; -0 only comes from a stored offset.
+                if offset.iter().any(|c| c.to_bits() != 0) {
+                    shapes[t][*p as usize] = Some(Vec3::from_array(offset));
+                }
+            }
+        }
+    }
+    let shapes = names.into_iter().zip(shapes).map(|(name, offsets)| {
+        let moved = offsets.into_iter().enumerate().filter_map(|(p, o)| Some((p as u32, o?)));
+        let (points, offsets) = moved.unzip();
+        BlendShape { name, points, offsets }
+    });
+    Ok((mesh, shapes.collect()))
+}
+
+fn maps(document: &Document, entries: &MapEntries) -> Result<SkinMaps, ImportError> {
+    let optional = |name: &str, entry: &Option<MapEntry>, channels| {
+        entry.as_ref().map(|e| map(document, name, e, channels, 0)).transpose()
+    };
+    let mut maps = SkinMaps {
+        melanin: optional("melanin", &entries.melanin, 1)?,
+        hemoglobin: optional("hemoglobin", &entries.hemoglobin, 1)?,
+        hemoglobin_mean: optional("hemoglobin mean", &entries.hemoglobin_mean, 1)?,
+        slopes: optional("slopes", &entries.slopes, 2)?,
+        specular: optional("specular", &entries.specular, 2)?,
+        scattering: optional("scattering", &entries.scattering, 1)?,
+        hair: optional("hair", &entries.hair, 1)?,
+        hair_color_linear: entries.hair_color_linear,
+        ..SkinMaps::default()
+    };
+    for d in &entries.distributions {
+        maps.distributions.push(Distribution {
+            name: d.name.clone(),
+            scale: map(document, &format!("distribution {} scale", d.name), &d.scale, 1, 0)?,
+            bias: map(document, &format!("distribution {} bias", d.name), &d.bias, 1, 0)?,
+        });
+    }
+    for (i, entry) in entries.wrinkle_slopes.iter().enumerate() {
+        maps.wrinkle_slopes.push(map(document, &format!("wrinkle slopes {i}"), entry, 2, 0)?);
+    }
+    for z in &entries.zones {
+        let mask = map(document, &format!("zone {}", z.name), &z.mask, 1, z.channel)?;
+        maps.zones.push(WrinkleZone { name: z.name.clone(), wrinkle_map: z.wrinkle_map, mask });
+    }
+    Ok(maps)
+}
+
+/// Decodes an image and turns texels into values.
+fn map(
+    document: &Document,
+    name: &str,
+    entry: &MapEntry,
+    channels: u32,
+    channel: u32,
+) -> Result<Map, ImportError> {
+    let at = format!("{NAME}, map {name}");
+    let values = entry.offset.iter().chain(&entry.scale);
+    if entry.offset.len() != channels as usize || entry.scale.len() != channels as usize || channel > 3 {
+        let found =
+            format!("{} offsets, {} scales, channel {channel}", entry.offset.len(), entry.scale.len());
+        return Err(document.fail(&at, found, format!("{channels} of each, a channel from 0 to 3")));
+    }
+    if let Some(v) = values.into_iter().find(|v| !v.is_finite()) {
+        return Err(document.fail(&at, v.to_string(), "finite offset and scale"));
+    }
+    let bytes = document.image(entry.image)?;
+    let picture = image::load_from_memory(&bytes)
+        .map_err(|e| document.fail(&at, e.to_string(), "a PNG or JPEG image"))?;
+    let (width, height) = (picture.width(), picture.height());
+    let (step, starts) = match entry.layout {
+        ChannelLayout::First => (1, vec![0]),
+        ChannelLayout::Stacked => (1, vec![0, (width * (height / 2)) as usize]),
+        ChannelLayout::Interleaved => (4, vec![0, 1]),
+        ChannelLayout::Channel => (4, vec![channel as usize]),
+    };
+    if starts.len() != channels as usize || (entry.layout == ChannelLayout::Stacked && height % 2 != 0) {
+        let found = format!("layout {:?} of an image {width} x {height}", entry.layout);
+        return Err(document.fail(&at, found, format!("{channels} channels")));
+    }
+    // Grey images are read as grey (a 16-bit one keeps its bits); colour images as RGBA.
+    let texels: Vec<f32> = if step == 1 && picture.color().has_color() {
+        picture.to_rgba32f().into_raw().into_iter().step_by(4).collect()
+    } else if step == 1 {
+        picture.to_luma16().into_raw().into_iter().map(|t| f32::from(t) / 65535.0).collect()
+    } else {
+        picture.to_rgba8().into_raw().into_iter().map(|t| f32::from(t) / 255.0).collect()
+    };
+    let height = if entry.layout == ChannelLayout::Stacked { height / 2 } else { height };
+    let count = (width * height) as usize;
+    let mut out = Map { width, height, channels, values: Vec::with_capacity(count * channels as usize) };
+    for i in 0..count {
+        for (c, start) in starts.iter().enumerate() {
+            out.values.push(entry.offset[c] + entry.scale[c] * texels[start + i * step]);
+        }
+    }
+    Ok(out)
+}

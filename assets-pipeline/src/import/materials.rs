@@ -1,0 +1,72 @@
+//! Materials of foreign meshes, guessed from the names that their authors gave.
+
+use rubor_rig::head::Material;
+
+/// Words in names (lower case) and what they mean; the first that occurs wins, so special ones stand first.
+const WORDS: [(&str, Material); 34] = [
+    ("eyeocclusion", Material::Hidden),
+    ("eye_occlusion", Material::Hidden),
+    ("occlusion", Material::Hidden),
+    ("eyeblend", Material::Hidden),
+    ("eye_blend", Material::Hidden),
+    ("eyeshell", Material::Hidden),
+    ("eyeshadow", Material::Hidden),
+    ("lacrimal", Material::Wet),
+    ("tearline", Material::Wet),
+    ("tear", Material::Wet),
+    ("cornea", Material::Wet),
+    ("eyewet", Material::Wet),
+    ("lash", Material::Lash),
+    ("brow", Material::Hair),
+    ("hair", Material::Hair),
+    ("beard", Material::Hair),
+    ("sclera", Material::Eye),
+    ("iris", Material::Eye),
+    ("eyeball", Material::Eye),
+    ("gum", Material::Gums),
+    ("tongue", Material::Gums),
+    ("teeth", Material::Teeth),
+    ("tooth", Material::Teeth),
+    ("socket", Material::Mucosa),
+    ("mouth", Material::Mucosa),
+    ("face", Material::Skin),
+    ("head", Material::Skin),
+    ("skin", Material::Skin),
+    ("body", Material::Skin),
+    ("neck", Material::Skin),
+    ("ears", Material::Skin),
+    ("lip", Material::Skin),
+    ("cloth", Material::Other),
+    ("eye", Material::Eye),
+];
+
+/// The material that a name speaks of; skin where it speaks of nothing known (a mesh without names is mostly a scan).
+pub fn guess_material(name: &str) -> Material {
+    let name = name.to_lowercase();
+    WORDS.iter().find(|(word, _)| name.contains(word)).map_or(Material::Skin, |(_, m)| *m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_common_sets_are_understood() {
+        for (name, material) in [
+            ("M_Face", Material::Skin),
+            ("M_BackHead", Material::Skin),
+            ("M_GumsTongue", Material::Gums),
+            ("M_Teeth", Material::Teeth),
+            ("M_ScleraLeft", Material::Eye),
+            ("M_IrisRight", Material::Eye),
+            ("M_LacrimalFluid", Material::Wet),
+            ("M_EyeBlend", Material::Hidden),
+            ("M_EyeOcclusion", Material::Hidden),
+            ("M_EyeLashes", Material::Lash),
+            ("eyeball_L", Material::Eye),
+            ("Material.001", Material::Skin),
+        ] {
+            assert_eq!(guess_material(name), material, "{name}");
+        }
+    }
+}

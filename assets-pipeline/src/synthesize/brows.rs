@@ -1,0 +1,170 @@
+//! Hair baked into the maps: brows stroke by stroke, and the tint of shaven or cropped hair.
+
+use glam::{Vec2, Vec3};
+
+use super::Options;
+use super::face_space::plan;
+use super::lines::{Line, Lines};
+use super::noise::{Stream, features, noise, smoothstep, unit};
+use super::regions::{Regions, above_hairline, through};
+
+/// Upper and lower border of the brow on the plan: (s, low, high), mm. The head of the brow is upright and soft, the
+/// arch is highest at two thirds, the tail is thin.
+const BROW: [[f32; 3]; 8] = [
+    [9.5, 17.6, 23.2],
+    [13.0, 18.2, 25.6],
+    [20.0, 20.0, 27.6],
+    [30.0, 22.0, 28.8],
+    [40.0, 23.0, 28.6],
+    [48.0, 22.0, 26.6],
+    [56.0, 18.8, 22.2],
+    [63.0, 15.0, 16.8],
+];
+
+/// One hair's look.
+#[derive(Clone, Copy)]
+struct Hair {
+    half_width_mm: f32,
+    opacity: f32,
+}
+
+/// The hair of a person.
+pub(crate) struct Hairs {
+    hairs: Vec<Hair>,
+    lines: Lines,
+    seed: u32,
+    finest_mm: f32,
+    stubble: f32,
+    scalp: f32,
+    /// Melanin fraction that stands for hair.
+    pub melanin: f32,
+}
+
+impl Hairs {
+    pub(crate) fn new(options: &Options, texel_mm: f32) -> Self {
+        let mut stream = Stream::new(options.seed_bits() ^ 0xb201);
+        let (mut hairs, mut lines) = (Vec::new(), Vec::new());
+        for side in [1.0, -1.0] {
+            // The two brows are alike, not equal.
+            let lift = Vec2::new(0.5 * stream.normal(), 0.5 * stream.normal());
+            let count = (430.0 * options.brows) as usize;
+            for _ in 0..count {
+                let (hair, knots) = brow_hair(&mut stream);
+                let knots = knots.map(|k| Vec2::new(side * (k.x + lift.x), k.y + lift.y));
+                lines.push(Line::through(&knots, 1.0, 0.45_f32.max(1.2 * texel_mm)));
+                hairs.push(hair);
+            }
+        }
+        Self {
+            hairs,
+            lines: Lines::new(lines, 1.5),
+            seed: options.seed_bits() ^ 0xb202,
+            finest_mm: texel_mm,
+            stubble: options.stubble,
+            scalp: options.scalp_hair,
+            melanin: options.hair_melanin,
+        }
+    }
+
+    /// How much of the skin is hidden by hair, 0 to 1.
+    pub(crate) fn cover(&self, place: Vec3, r: &Regions) -> f32 {
+        let mut clear = 1.0;
+        if place.z > 20.0 && (0.0..48.0).contains(&place.y) {
+            self.lines.near(plan(place), |n| {
+                let hair = self.hairs[n.line];
+                let t = n.along_mm / self.lines.line(n.line).length_mm();
+                // Hairs taper to their tips; one thinner than a texel covers part of it.
+                let width = hair.half_width_mm * (1.0 - 0.75 * t * t);
+                let drawn = width.max(0.6 * self.finest_mm);
+                let profile = smoothstep(1.6 * drawn, 0.2 * drawn, n.distance_mm.abs());
+                clear *= 1.0 - hair.opacity * (width / drawn).min(1.0) * profile;
+            });
+            clear *= 1.0 - 0.16 * brow_shadow(plan(place)) * f32::from(!self.hairs.is_empty());
+        }
+        let beard = self.stubble * r.beard;
+        if beard > 0.01 {
+            clear *= 1.0 - self.cropped(place, 0.95, 0.12, beard);
+        }
+        let height = above_hairline(plan(place)) + 2.0 * noise(place, 16.0, self.seed ^ 9);
+        let scalp = self.scalp * smoothstep(-5.0, 14.0, height) * (1.0 - r.ear);
+        if scalp > 0.01 {
+            clear *= 1.0 - self.cropped(place, 0.62, 0.14, scalp);
+        }
+        1.0 - clear
+    }
+
+    /// Cut hairs as dots over a tint.
+    fn cropped(&self, place: Vec3, spacing_mm: f32, radius_mm: f32, density: f32) -> f32 {
+        let radius = radius_mm.max(0.55 * self.finest_mm) / spacing_mm;
+        let faded = (radius_mm / spacing_mm / radius).powi(2);
+        let mut dots = 0.0f32;
+        features(place / spacing_mm, self.seed ^ 5, |h, d| {
+            // Thinning hair is fewer hairs, not fainter ones.
+            if unit(h) < 1.1 * density {
+                dots = dots.max(smoothstep(1.5 * radius, 0.4 * radius, d.length()));
+            }
+        });
+        // The tint of roots below the surface, and of hair behind hair where it is dense.
+        let tint = 0.22 * density + 0.42 * density * density;
+        (tint + (0.9 - tint) * dots * faded.sqrt()).min(0.97)
+    }
+}
+
+/// 1 inside the brow, soft at its border.
+fn brow_shadow(p: Vec2) -> f32 {
+    let s = p.x.abs();
+    let (low, high) = brow_borders(s);
+    smoothstep(low - 1.5, low + 1.5, p.y)
+        * smoothstep(high + 1.5, high - 1.5, p.y)
+        * smoothstep(8.0, 13.0, s)
+        * smoothstep(65.0, 58.0, s)
+}
+
+fn brow_borders(s: f32) -> (f32, f32) {
+    let border = |k: usize| {
+        let knots = BROW.map(|b| [b[0], b[k]]);
+        through(&knots, s)
+    };
+    (border(1), border(2))
+}
+
+/// A hair of the left brow: root, bend and tip on the plan.
+fn brow_hair(stream: &mut Stream) -> (Hair, [Vec2; 4]) {
+    // Denser in the body than in head and tail.
+    let u = loop {
+        let u = stream.range(0.0, 1.0);
+        let (low, high) = brow_borders(BROW[0][0] + (BROW[7][0] - BROW[0][0]) * u);
+        let density = smoothstep(-0.08, 0.22, u) * smoothstep(1.1, 0.8, u) * ((high - low) / 8.5).min(1.0);
+        if stream.range(0.0, 1.0) < density {
+            break u;
+        }
+    };
+    let s = BROW[0][0] + (BROW[7][0] - BROW[0][0]) * u;
+    let (low, high) = brow_borders(s);
+    // Roots crowd about the middle of the band.
+    let v = (0.5 + 0.24 * stream.normal()).clamp(-0.12, 1.12);
+    let root = Vec2::new(s, low + (high - low) * v);
+    // Hairs of the head stand up; further out the lower ones rise, the upper ones fall, and they meet in a crest.
+    let (next_low, next_high) = brow_borders(s + 1.0);
+    let along = (0.5 * (next_low + next_high - low - high)).atan2(1.0).to_degrees();
+    let upright = smoothstep(0.26, 0.0, u);
+    let converge = 30.0 * (0.6 - v) * smoothstep(0.9, 0.5, u);
+    let angle =
+        along + converge + upright * (62.0 - along) + 8.0 * smoothstep(0.5, 0.2, u) + 9.0 * stream.normal();
+    let length = (7.4 - 2.6 * upright - 3.0 * smoothstep(0.6, 1.0, u)) * (1.0 + 0.16 * stream.normal());
+    // Hairs lie over as they leave the root.
+    let curl = -9.0 - 10.0 * upright * stream.range(0.3, 1.0) + 5.0 * stream.normal();
+    let mut knots = [root; 4];
+    let mut heading = angle;
+    for i in 1..4 {
+        let (sin, cos) = heading.to_radians().sin_cos();
+        knots[i] = knots[i - 1] + Vec2::new(cos, sin) * (length / 3.0);
+        heading += curl;
+    }
+    let edge = (2.0 * (v - 0.5).abs()).min(1.2);
+    let hair = Hair {
+        half_width_mm: 0.085 * stream.range(0.7, 1.25) * (1.0 - 0.25 * edge),
+        opacity: stream.range(0.55, 0.95) * (1.0 - 0.35 * upright) * (1.0 - 0.25 * edge),
+    };
+    (hair, knots)
+}

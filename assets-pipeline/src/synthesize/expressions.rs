@@ -1,0 +1,279 @@
+//! Hemoglobin of expressions and conditions, as local statistics.
+//!
+//! A full map of each state is made from the neutral one and reduced to mean and deviation (papers/004 eq. 7.1, 7.5).
+//! The rules follow the findings of section 7.3.1: blood leaves compressed skin and gathers elsewhere (over the cheek
+//! bones in a smile); the pattern of a person's vessels stays and only its strength changes; exercise and alcohol
+//! have different patterns, neither is the neutral map times a number. Changes are relative to neutral and differ a
+//! few percent between the sides.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use rubor_rig::head::Distribution;
+use rubor_rig::hemoglobin::{self, HemoglobinError};
+use rubor_rig::map::Map;
+use rubor_rig::mask::Mask;
+
+use super::noise::{Stream, noise};
+use super::regions::Regions;
+use super::surface::Coverage;
+
+/// Relative change of the mean hemoglobin by region, and how much patchier it becomes.
+struct State {
+    name: &'static str,
+    everywhere: f32,
+    change: fn(&Regions) -> f32,
+    /// Factor of the relative spread where the mean rises fully.
+    patchiness: f32,
+}
+
+const STATES: [State; 9] = [
+    State {
+        name: "joy",
+        everywhere: 0.0,
+        // The cheek is lifted against the bone; lips and the fold's rim are stretched thin.
+        change: |r| {
+            0.34 * r.cheek_bone + 0.36 * r.cheek - 0.20 * r.lips - 0.10 * r.upper_lip - 0.12 * r.chin
+                + 0.05 * r.nose_wing
+                - 0.10 * r.under_eye
+        },
+        patchiness: 1.15,
+    },
+    State {
+        name: "surprise",
+        everywhere: -0.03,
+        // The frontalis folds the forehead; the jaw drops and stretches cheeks and lips.
+        change: |r| {
+            0.16 * r.forehead
+                - 0.10 * r.cheek
+                - 0.12 * r.lower_cheek
+                - 0.14 * r.lips
+                - 0.08 * r.chin
+                - 0.06 * r.lids
+        },
+        patchiness: 1.0,
+    },
+    State {
+        name: "fear",
+        everywhere: -0.16,
+        // Vessels close; the mouth is drawn wide.
+        change: |r| {
+            -0.14 * r.cheek
+                - 0.12 * r.lower_cheek
+                - 0.20 * r.lips
+                - 0.10 * r.forehead
+                - 0.12 * r.upper_lip
+                - 0.10 * r.nose
+                - 0.08 * r.ear
+        },
+        patchiness: 0.85,
+    },
+    State {
+        name: "anger",
+        everywhere: 0.08,
+        // Brows press blood up the forehead; face, ears and neck flush; lips are pressed pale.
+        change: |r| {
+            0.34 * r.forehead
+                + 0.16 * r.glabella
+                + 0.20 * r.temple
+                + 0.22 * r.cheek
+                + 0.18 * r.lower_cheek
+                + 0.30 * r.ear
+                + 0.26 * r.neck
+                + 0.16 * r.nose
+                - 0.28 * r.lips
+                - 0.14 * r.upper_lip
+                - 0.06 * r.chin
+        },
+        patchiness: 1.2,
+    },
+    State {
+        name: "disgust",
+        everywhere: -0.02,
+        // The nose is wrinkled and drained, the cheek beside it is bunched.
+        change: |r| {
+            -0.24 * r.nose + 0.16 * r.nose_wing + 0.26 * r.cheek + 0.10 * r.cheek_bone
+                - 0.20 * r.upper_lip
+                - 0.10 * r.lips
+                + 0.10 * r.glabella
+                + 0.10 * r.under_eye
+        },
+        patchiness: 1.1,
+    },
+    State {
+        name: "sadness",
+        everywhere: -0.04,
+        // Eyes and the tip of the nose redden; the tensed chin drains.
+        change: |r| {
+            0.30 * r.lids + 0.26 * r.under_eye + 0.35 * r.lid_edge + 0.30 * r.nose_tip + 0.18 * r.nose_wing
+                - 0.10 * r.cheek
+                - 0.18 * r.chin
+                + 0.06 * r.lips
+                + 0.06 * r.forehead
+        },
+        patchiness: 1.05,
+    },
+    State {
+        name: "exercise",
+        everywhere: 0.16,
+        // Heat is shed over a large area: cheeks, forehead, temples, neck; the mouth's surroundings stay pale.
+        change: |r| {
+            0.46 * r.cheek
+                + 0.38 * r.lower_cheek
+                + 0.30 * r.cheek_bone
+                + 0.34 * r.forehead
+                + 0.34 * r.temple
+                + 0.24 * r.chin
+                + 0.30 * r.neck
+                + 0.24 * r.ear
+                + 0.08 * r.nose
+                + 0.10 * r.lips
+                - 0.22 * r.upper_lip
+        },
+        patchiness: 1.3,
+    },
+    State {
+        name: "alcohol",
+        everywhere: 0.05,
+        // Centred on nose and inner cheeks, with lids and ears.
+        change: |r| {
+            0.46 * r.nose
+                + 0.40 * r.nose_tip
+                + 0.34 * r.nose_wing
+                + 0.50 * r.cheek
+                + 0.10 * r.cheek_bone
+                + 0.24 * r.lids
+                + 0.14 * r.chin
+                + 0.26 * r.ear
+                + 0.06 * r.forehead
+                + 0.08 * r.lips
+        },
+        patchiness: 1.4,
+    },
+    State {
+        name: "blush",
+        everywhere: 0.04,
+        // Cheeks and ears first, spreading to the neck in blotches.
+        change: |r| {
+            0.52 * r.cheek
+                + 0.46 * r.cheek_bone
+                + 0.36 * r.lower_cheek
+                + 0.55 * r.ear
+                + 0.26 * r.neck
+                + 0.14 * r.forehead
+                + 0.12 * r.nose
+                + 0.10 * r.chin
+        },
+        patchiness: 1.15,
+    },
+];
+
+/// What one state does at a place: factors of mean and of relative spread.
+fn response(state: &State, index: usize, side: f32, place: Vec3, r: &Regions, seed: u32) -> (f32, f32) {
+    let lateral = (place.x / 25.0).clamp(-1.0, 1.0);
+    let own = noise(place, 24.0, seed ^ (0x600 + index as u32));
+    let change = (state.change)(r) * (1.0 + side * lateral) * (1.0 + 0.14 * own) + state.everywhere;
+    let rise = (change / 0.5).clamp(0.0, 1.0);
+    ((1.0 + change).max(0.2), 1.0 + (state.patchiness - 1.0) * rise)
+}
+
+/// Neutral and all states as statistics in discs of `radius_px` texels of `coverage`.
+///
+/// The first is named `neutral`: its bias is `mu_n` (`bias_0` of eq. 7.5) and its scale 1, so that who blends them
+/// needs no other map. `hemoglobin` gives the regions, the mean and the value of the neutral map at a place.
+pub(crate) fn distributions(
+    coverage: &Coverage<'_>,
+    radius_px: u32,
+    size: u32,
+    seed: u32,
+) -> (Map, Vec<Distribution>) {
+    // A quarter of a million texels carry the statistics of any map.
+    let stride = (full.resolution() / 512).max(1);
+    hemoglobin: impl Fn(Vec3) -> (Regions, f32, f32) + Sync,
+) -> Result<Vec<Distribution>, HemoglobinError> {
+    let mut stream = Stream::new(seed ^ 0x51de);
+    let sides: Vec<f32> = STATES.iter().map(|_| (0.045 * stream.normal()).clamp(-0.09, 0.09)).collect();
+    let side = coverage.resolution();
+    let sites: Vec<Option<(Vec3, Regions, f32, f32)>> = (0..side * side)
+        .into_par_iter()
+        .map(|i| {
+            let place = coverage.site(i % side, i / side)?.place;
+            let (r, mean, value) = hemoglobin(place);
+            Some((place, r, mean, value))
+        })
+        .collect();
+    let described: Vec<(Vec3, f32, f32, f32, Regions)> = sampled
+        .par_iter()
+        .map(|(site, area, value)| {
+            let r = Regions::at(site.place);
+            (site.place, *area, *value, chromophores.hemoglobin_mean(site.place, &r), r)
+        })
+        .collect();
+    let base: Vec<Sample> = described
+        .iter()
+        .map(|(place, area, value, _, _)| Sample { place: *place, area: *area, value: *value })
+        .collect();
+    let neutral_statistics = LocalStatistics::of(&base);
+    let sites: Vec<Option<Site>> = (0..low.resolution())
+        .flat_map(|y| (0..low.resolution()).map(move |x| (x, y)))
+        .map(|(x, y)| low.site(x, y))
+        .collect();
+    let mut neutral_mean = Map::filled(low.resolution(), low.resolution(), &[0.0]);
+    for (value, site) in neutral_mean.values.iter_mut().zip(&sites) {
+        if let Some(site) = site {
+            *value = neutral_statistics.at(site.place).0;
+        }
+    }
+    low.fill_empty(&mut neutral_mean);
+    let distributions = STATES
+        .par_iter()
+        .enumerate()
+        .map(|(index, state)| {
+            let samples: Vec<Sample> = described
+                .iter()
+                .map(|(place, area, value, mean, r)| {
+                    let (gain, spread) = response(state, index, sides[index], *place, r, seed);
+                    Sample { place: *place, area: *area, value: gain * (mean + spread * (value - mean)) }
+                })
+                .collect();
+            let target = LocalStatistics::of(&samples);
+            let mut scale = Map::filled(low.resolution(), low.resolution(), &[1.0]);
+            let mut bias = Map::filled(low.resolution(), low.resolution(), &[0.0]);
+            for (i, site) in sites.iter().enumerate() {
+                if let Some(site) = site {
+                    let (mean, deviation) = target.at(site.place);
+                    let (_, neutral_deviation) = neutral_statistics.at(site.place);
+                    // Where the neutral map is flat there is no pattern to scale.
+                    scale.values[i] =
+                        if neutral_deviation > 1e-6 { (deviation / neutral_deviation).min(4.0) } else { 1.0 };
+                    bias.values[i] = mean;
+                }
+            }
+            low.fill_empty(&mut scale);
+            low.fill_empty(&mut bias);
+            Distribution { name: state.name.into(), scale, bias }
+        })
+        .collect();
+    (neutral_mean, distributions)
+    let mask = Mask { width: side, height: side, mapped: sites.iter().map(Option::is_some).collect() };
+    let map_of = |value: &(dyn Fn(&(Vec3, Regions, f32, f32)) -> f32 + Sync)| Map {
+        width: side,
+        height: side,
+        channels: 1,
+        values: sites.par_iter().map(|s| s.as_ref().map_or(0.0, value)).collect(),
+    };
+    let neutral = hemoglobin::neutral(&map_of(&|(_, _, _, value)| *value), &mask, radius_px, size)?;
+    let unchanged = Distribution {
+        name: "neutral".into(),
+        scale: Map::filled(neutral.mean.width, neutral.mean.height, &[1.0]),
+        bias: neutral.mean.clone(),
+    };
+    let mut all = vec![unchanged];
+    for (index, state) in STATES.iter().enumerate() {
+        let target = map_of(&|(place, r, mean, value)| {
+            let (gain, spread) = response(state, index, sides[index], *place, r, seed);
+            gain * (mean + spread * (value - mean))
+        });
+        all.push(hemoglobin::distribution(state.name, &neutral, &target, &mask, radius_px, size)?);
+    }
+    Ok(all)
+}

@@ -1,0 +1,302 @@
+//! Maps for a head that has no measured ones.
+//!
+//! ```text
+//! head --landmarks--> face space (canonical mm) --+
+//!      --skin UVs---> surface (texel -> place) ---+--> fields of place --> SkinMaps
+//! ```
+//!
+//! Every map is a field of the canonical place of the skin: noise, regions, lines and hairs live in three dimensions
+//! (or on the unrolled front of the face) and never see the texture, so no border of the texture shows. Heights are in
+//! millimetres and become slopes by differentiation along the texture frame, so relief has its true depth on any head.
+//! All of it follows from the head, the options and the seed; the number of threads has no influence.
+//!
+//! What it does not do: nothing here is measured from a person. The distributions of expressions follow the findings
+//! of papers/004 section 7.3.1, not their data.
+
+mod brows;
+mod chromophores;
+mod expressions;
+mod face_space;
+mod lines;
+mod noise;
+mod regions;
+mod relief;
+mod specular;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod wrinkles;
+
+use rubor_rig::head::{Head, Provenance, ProvenanceKind, SkinMaps, WrinkleZone};
+use thiserror::Error;
+
+use brows::Hairs;
+use chromophores::Chromophores;
+use face_space::FaceSpace;
+use regions::Regions;
+use relief::Relief;
+use surface::SkinSurface;
+use wrinkles::Wrinkles;
+
+/// Side of the maps of hemoglobin distributions, texels (papers/004 section 7.6).
+pub const DISTRIBUTION_RESOLUTION: u32 = 256;
+/// Side of the maps that local statistics are taken on, texels: they need many values, not their neighbourhood.
+const STATISTICS_RESOLUTION: u32 = 512;
+/// Radius of the disc of local statistics (papers/004 eq. 7.1), mm on the front of the face.
+const STATISTICS_RADIUS_MM: f32 = 8.0;
+/// Side of zone masks, texels.
+pub const MASK_RESOLUTION: u32 = 128;
+/// Side of the maps that [`synthesize`] accepts, texels.
+pub const RESOLUTIONS: std::ops::RangeInclusive<u32> = 256..=4096;
+
+/// Who the maps are of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Another seed is another person with the same parameters.
+    pub seed: u64,
+    /// Side of the detailed maps, texels, within [`RESOLUTIONS`].
+    pub resolution: u32,
+    /// Mean melanin volume fraction of the epidermis, 0 to 0.5: 0.02 very light, 0.3 very dark.
+    pub melanin: f32,
+    /// Mean hemoglobin volume fraction of the dermis, 0 to 0.15.
+    pub hemoglobin: f32,
+    /// Age in years, 15 to 90: deeper relief and lasting expression lines.
+    pub age_years: f32,
+    /// Amount of freckles, 0 to 1.
+    pub freckles: f32,
+    /// Number of moles, up to 100.
+    pub moles: u32,
+    /// Fullness of the brows, 0 (none) to 2.
+    pub brows: f32,
+    /// Beard stubble, 0 to 1.
+    pub stubble: f32,
+    /// Cropped scalp hair, 0 (bald) to 1.
+    pub scalp_hair: f32,
+    /// Melanin fraction that stands for hair, up to 0.5.
+    pub hair_melanin: f32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            resolution: 2048,
+            melanin: 0.03,
+            hemoglobin: 0.014,
+            age_years: 32.0,
+            freckles: 0.3,
+            moles: 7,
+            brows: 1.0,
+            stubble: 0.0,
+            scalp_hair: 0.85,
+            hair_melanin: 0.5,
+        }
+    }
+}
+
+impl Options {
+    /// The seed as the hashes take it.
+    fn seed_bits(&self) -> u32 {
+        (self.seed ^ (self.seed >> 32)) as u32
+    }
+
+    fn check(&self) -> Result<(), SynthesizeError> {
+        if !RESOLUTIONS.contains(&self.resolution) {
+            return Err(SynthesizeError::Resolution { found: self.resolution });
+        }
+        let ranges = [
+            ("melanin", self.melanin, 0.0, 0.5),
+            ("hemoglobin", self.hemoglobin, 0.0, 0.15),
+            ("age_years", self.age_years, 15.0, 90.0),
+            ("freckles", self.freckles, 0.0, 1.0),
+            ("moles", self.moles as f32, 0.0, 100.0),
+            ("brows", self.brows, 0.0, 2.0),
+            ("stubble", self.stubble, 0.0, 1.0),
+            ("scalp_hair", self.scalp_hair, 0.0, 1.0),
+            ("hair_melanin", self.hair_melanin, 0.0, 0.5),
+        ];
+        for (option, found, low, high) in ranges {
+            // Written so that NaN fails.
+            if !(low..=high).contains(&found) {
+                return Err(SynthesizeError::Option { option, found, low, high });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why maps could not be made.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SynthesizeError {
+    /// The resolution is out of range.
+    #[error("resolution: found {found}, expected {} to {} texels", RESOLUTIONS.start(), RESOLUTIONS.end())]
+    Resolution {
+        /// What was asked for.
+        found: u32,
+    },
+    /// An option is out of range or not a number.
+    #[error("option {option}: found {found}, expected {low} to {high}")]
+    Option {
+        /// Name of the field of [`Options`].
+        option: &'static str,
+        /// What was asked for.
+        found: f32,
+        /// Least accepted value.
+        low: f32,
+        /// Greatest accepted value.
+        high: f32,
+    },
+    /// The hemoglobin of a state could not be reduced to statistics.
+    #[error("hemoglobin distributions: {0}")]
+    Hemoglobin(#[from] rubor_rig::hemoglobin::HemoglobinError),
+    /// There is nothing to draw on.
+    #[error(
+        "head {head}: found no skin triangle with area in the texture's unit square, expected a part of material skin"
+    )]
+    NoSkin {
+        /// Name of the head.
+        head: String,
+    },
+}
+
+/// Makes all maps of a head.
+///
+/// Melanin, hemoglobin and slopes have the resolution of the options; wrinkle slopes, specular and scattering half of
+/// it; distributions [`DISTRIBUTION_RESOLUTION`], zone masks [`MASK_RESOLUTION`]. Texels without skin hold means of
+/// the skin about them. The distributions begin with
+/// one named `neutral`, whose bias is the local mean of the neutral map. Landmarks that a head lacks are done without; with fewer than six the maps are placed by the
+/// head's bounds, which is rough.
+///
+/// # Errors
+/// Options out of range, or a head without skin.
+pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, SynthesizeError> {
+    options.check()?;
+    let space = FaceSpace::fit(head);
+    let surface = SkinSurface::new(head, &space);
+    if surface.is_empty() {
+        return Err(SynthesizeError::NoSkin { head: head.name.clone() });
+    }
+    let seed = options.seed_bits();
+    let chromophores = Chromophores::new(options);
+    let wrinkles = Wrinkles::new(seed);
+    let lasting = lasting_lines(options.age_years);
+
+    let full = surface.rasterise(options.resolution);
+    let texel_mm = surface.texel_mm(options.resolution);
+    let relief = Relief::new(seed, texel_mm, options.age_years);
+    let hairs = Hairs::new(options, texel_mm);
+    let mut detailed = full.bake::<4>(&[1, 1, 2], |site| {
+        let r = Regions::at(site.place);
+        let relief = relief.sample(site, &r);
+        let hair = hairs.cover(site.place, &r);
+        let melanin = chromophores.melanin(site.place, &r, relief.cavity);
+        let melanin = melanin + hair * (hairs.melanin - melanin);
+        let hemoglobin = chromophores.hemoglobin_with_mean(site.place, &r).1 * hemoglobin_under_hair(hair);
+        let mut gradient = relief.gradient;
+        if Wrinkles::reach(site.place) {
+            gradient += lasting * wrinkles.gradient(site.place);
+        }
+        let [x, y] = site.slopes(gradient);
+        [melanin.clamp(0.0, 0.5), hemoglobin.clamp(0.0, 0.32), x, y]
+    });
+    let slopes = detailed.pop();
+    let hemoglobin = detailed.pop();
+    let melanin = detailed.pop();
+
+    let half = surface.rasterise((options.resolution / 2).max(*RESOLUTIONS.start()));
+    let texel_mm = surface.texel_mm(half.resolution());
+    let half_relief = Relief::new(seed, texel_mm, options.age_years);
+    let half_hairs = Hairs::new(options, texel_mm);
+    let mut broad = half.bake::<5>(&[2, 2, 1], |site| {
+        let r = Regions::at(site.place);
+        let [x, y] =
+            if Wrinkles::reach(site.place) { site.slopes(wrinkles.gradient(site.place)) } else { [0.0; 2] };
+        let hair = half_hairs.cover(site.place, &r);
+        let cavity = half_relief.sample(site, &r).cavity;
+        let [intensity, roughness] = specular::specular(site.place, &r, cavity, hair, seed);
+        [x, y, intensity, roughness, 1.0 - 0.7 * hair]
+    });
+    let scattering = broad.pop();
+    let specular = broad.pop();
+    let wrinkle_slopes = broad;
+
+    let low = surface.rasterise(DISTRIBUTION_RESOLUTION);
+    let (hemoglobin_mean, distributions) = hemoglobin
+        .as_ref()
+        .map(|neutral| expressions::distributions(&chromophores, &full, neutral, &low, seed))
+        .unzip();
+    let coarse = surface.rasterise(STATISTICS_RESOLUTION);
+    let texel_mm = surface.texel_mm(STATISTICS_RESOLUTION);
+    let radius_px = (STATISTICS_RADIUS_MM / texel_mm).round().clamp(2.0, 64.0) as u32;
+    let coarse_hairs = Hairs::new(options, texel_mm);
+    let distributions =
+        expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |place| {
+            let r = Regions::at(place);
+            let factor = hemoglobin_under_hair(coarse_hairs.cover(place, &r));
+            let (mean, value) = chromophores.hemoglobin_with_mean(place, &r);
+            (r, factor * mean, factor * value)
+        })?;
+    let masks = surface.rasterise(MASK_RESOLUTION);
+    let zones = masks
+        .bake::<12>(&[1; 12], |site| wrinkles::zone_weights(site.place))
+        .into_iter()
+        .zip(wrinkles::ZONES)
+        .map(|(mask, name)| WrinkleZone { name: name.into(), wrinkle_map: 0, mask })
+        .collect();
+    Ok(SkinMaps {
+        melanin,
+        hemoglobin,
+        hemoglobin_mean,
+        distributions: distributions.unwrap_or_default(),
+        slopes,
+        wrinkle_slopes,
+        zones,
+        specular,
+        scattering,
+        hair: None,
+        hair_color_linear: [0.0; 3],
+    })
+}
+
+/// What hair leaves of the colour of blood.
+fn hemoglobin_under_hair(hair: f32) -> f32 {
+    1.0 - 0.3 * hair
+}
+
+/// Share of the expression wrinkles that stays on the face at rest.
+fn lasting_lines(age_years: f32) -> f32 {
+    0.03 + 0.5 * noise::smoothstep(26.0, 85.0, age_years)
+}
+
+/// What to write into a head's provenance for maps made by [`synthesize`].
+pub fn provenance(options: &Options) -> Vec<Provenance> {
+    let source = format!(
+        "rubor {} map synthesis, seed {}, {} texels, melanin {}, hemoglobin {}, age {}",
+        env!("CARGO_PKG_VERSION"),
+        options.seed,
+        options.resolution,
+        options.melanin,
+        options.hemoglobin,
+        options.age_years
+    );
+    ["melanin", "hemoglobin", "distributions", "slopes", "wrinkle_slopes", "zones", "specular", "scattering"]
+        .into_iter()
+        .map(|map| Provenance {
+            of: format!("maps.{map}"),
+            kind: ProvenanceKind::Synthesised,
+            source: source.clone(),
+            licence: "CC0-1.0".into(),
+        })
+        .collect()
+}
+
+/// Makes all maps of a head and puts them into it, replacing maps and their provenance.
+///
+/// # Errors
+/// As [`synthesize`]; the head is then unchanged.
+pub fn synthesize_into(head: &mut Head, options: &Options) -> Result<(), SynthesizeError> {
+    head.maps = synthesize(head, options)?;
+    head.provenance.retain(|p| !p.of.starts_with("maps."));
+    head.provenance.extend(provenance(options));
+    Ok(())
+}

@@ -1,0 +1,239 @@
+//! Fine relief of the skin as a height field in millimetres: pores, the net of furrows between them, lines of lips,
+//! lids and neck.
+//!
+//! Depths and sizes are those of profilometry of adult faces: pores 0.2 to 0.5 mm wide and 0.05 to 0.1 mm deep, the
+//! furrow net 0.3 to 1 mm wide in mesh and 0.02 to 0.05 mm deep, lip lines about 1.5 mm apart and 0.1 mm deep.
+//! Furrows stretch along the lines of relaxed skin tension (Borges 1984).
+
+use glam::{Vec2, Vec3};
+
+use super::face_space::{plan, plan_gradient};
+use super::noise::{features, gradient_noise, noise, smoothstep, unit};
+use super::regions::Regions;
+use super::surface::Site;
+
+/// Relief at a point.
+pub(crate) struct ReliefSample {
+    /// Gradient of the height (mm per mm) in canonical space.
+    pub gradient: Vec3,
+    /// How much the point lies in a pore or furrow, 0 to 1.
+    pub cavity: f32,
+}
+
+/// The fine relief of a person on maps of a given fineness.
+pub(crate) struct Relief {
+    seed: u32,
+    /// Finest feature that the map can hold, mm.
+    finest_mm: f32,
+    /// Deepens pores and furrows; 1 for a young adult.
+    coarseness: f32,
+}
+
+/// Direction of relaxed skin tension on the plan as cos and sin of the doubled angle; its length says how strongly
+/// the skin is oriented.
+fn tension(p: Vec2, r: &Regions) -> Vec2 {
+    let side = (p.x / 10.0).clamp(-1.0, 1.0);
+    let turned = |degrees: f32| {
+        let angle = (2.0 * degrees).to_radians();
+        Vec2::new(angle.cos(), side * angle.sin())
+    };
+    // Around the eye the lines run in rings.
+    let eye = Vec2::new(p.x.abs() - 33.5, (p.y + 3.0) * 1.3);
+    let ring = eye.perp().normalize_or_zero();
+    let ring = Vec2::new(ring.x * ring.x - ring.y * ring.y, 2.0 * ring.x * ring.y * side);
+    let near_eye = smoothstep(34.0, 14.0, eye.length()) * smoothstep(4.0, 9.0, eye.length());
+    let sum = turned(0.0) * (0.9 * r.forehead + 0.9 * r.neck + 0.5 * r.chin + 0.4 * r.scalp)
+        + turned(-62.0) * (r.cheek + r.lower_cheek + 0.6 * r.jaw)
+        + turned(-40.0) * r.cheek_bone
+        + ring * near_eye;
+    sum.clamp_length_max(1.0)
+}
+
+/// A symmetric tensor that stretches lengths across a direction of the surface by `stretch`.
+struct Metric {
+    across: Vec3,
+    excess: f32,
+}
+
+impl Metric {
+    fn new(place: Vec3, tension: Vec2, stretch: f32) -> Self {
+        let angle = 0.5 * tension.y.atan2(tension.x);
+        let radial = Vec2::new(place.x, place.z).normalize_or_zero();
+        let lateral = Vec3::new(radial.y, 0.0, -radial.x);
+        let across = -angle.sin() * lateral + angle.cos() * Vec3::Y;
+        let stretch = 1.0 + (stretch - 1.0) * tension.length();
+        Self { across, excess: stretch * stretch - 1.0 }
+    }
+
+    fn apply(&self, d: Vec3) -> Vec3 {
+        d + self.across * (self.excess * self.across.dot(d))
+    }
+}
+
+/// Noise on the plan with wavelengths `along_mm` and `across_mm` about a direction, and its canonical gradient.
+fn line_noise(place: Vec3, degrees: f32, along_mm: f32, across_mm: f32, seed: u32) -> (f32, Vec3) {
+    let p = plan(place);
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let depth = Vec2::new(place.x, place.z).length().max(10.0);
+    let q =
+        Vec3::new((cos * p.x + sin * p.y) / along_mm, (cos * p.y - sin * p.x) / across_mm, depth / along_mm);
+    let (value, g) = gradient_noise(q, seed);
+    let (du, dv) = (g.x / along_mm, g.y / across_mm);
+    let on_plan = plan_gradient(place, Vec2::new(cos * du - sin * dv, sin * du + cos * dv));
+    let radial = Vec3::new(place.x, 0.0, place.z) / depth;
+    (value, on_plan + radial * (g.z / along_mm))
+}
+
+/// Turns noise into grooves along its zeros with soft swellings between: height sqrt(n^2 + c).
+fn grooved((n, g): (f32, Vec3), roundness: f32) -> (f32, Vec3) {
+    let root = (n * n + roundness).sqrt();
+    (root, g * (n / root))
+}
+
+impl Relief {
+    pub(crate) fn new(seed: u32, texel_mm: f32, age_years: f32) -> Self {
+        let coarseness = 1.0 + 0.012 * (age_years - 30.0).clamp(-15.0, 50.0);
+        Self { seed: seed ^ 0x4e11, finest_mm: 2.0 * texel_mm, coarseness }
+    }
+
+    /// How much of a feature of this width a map can hold: 1 for wide ones, 0 for those under half the finest.
+    fn held(&self, width_mm: f32) -> f32 {
+        smoothstep(0.5, 1.2, width_mm / self.finest_mm)
+    }
+
+    pub(crate) fn sample(&self, site: &Site, r: &Regions) -> ReliefSample {
+        let c = site.place;
+        let p = plan(c);
+        let dry = (1.0 - r.lips.max(r.inner)).max(0.0);
+        let skin = dry * (1.0 - 0.75 * r.lids);
+        let tension = tension(p, r);
+        let mut gradient = Vec3::ZERO;
+        let mut cavity = 0.0;
+
+        // Unevenness between pores and features.
+        for (wavelength, height_mm, seed) in [(8.0, 0.040, 1u32), (2.7, 0.010, 2)] {
+            let g = gradient_noise(c / wavelength, self.seed ^ seed).1;
+            gradient += g * (height_mm * self.coarseness * dry / wavelength);
+        }
+
+        if skin > 0.01 {
+            let patch = (1.0 + 0.25 * noise(c, 6.0, self.seed ^ 3)).clamp(0.3, 1.7);
+            let (g, depth) = self.furrows(site, tension, r);
+            let depth_mm =
+                0.026 * (1.0 - 0.45 * r.forehead - 0.3 * r.nose + 0.4 * r.lower_cheek + 0.3 * r.neck);
+            let strength = skin * patch * self.coarseness;
+            gradient += g * (strength * depth_mm);
+            cavity += 0.45 * depth * strength;
+
+            let open = 0.16
+                + 0.75 * r.nose
+                + 0.9 * r.nose_tip
+                + 0.8 * r.nose_wing
+                + 0.6 * r.cheek
+                + 0.35 * r.chin
+                + 0.25 * r.glabella
+                + 0.2 * r.forehead
+                + 0.2 * r.upper_lip;
+            let open = open.min(1.0) * (1.0 - 0.8 * r.neck) * (1.0 - 0.7 * r.under_eye) * (1.0 - 0.7 * r.ear);
+            let metric = Metric::new(c, tension, 1.35);
+            for (layer, spacing_mm, radius_mm, share) in
+                [(0u32, 1.25, 0.22, 0.85 * open), (1, 0.74, 0.15, 0.35 + 0.6 * open)]
+            {
+                let (g, depth) = self.pores(site, &metric, layer, spacing_mm, radius_mm, share);
+                let depth_mm = if layer == 0 { 0.06 } else { 0.036 } * (0.6 + 0.7 * open);
+                let strength = skin * self.coarseness;
+                gradient += g * (strength * depth_mm);
+                cavity += depth * strength * if layer == 0 { 0.9 } else { 0.6 };
+            }
+        }
+
+        if r.lips > 0.01 {
+            let wave = 0.9 * noise(c, 5.0, self.seed ^ 11);
+            let at = c + Vec3::new(wave, 0.0, 0.0);
+            for (across, height_mm, seed) in [(1.7, 0.085, 12u32), (0.8, 0.028, 13)] {
+                let (n, g) = grooved(line_noise(at, 90.0, 7.0, across, self.seed ^ seed), 0.03);
+                let strength = r.lips * self.held(0.5 * across);
+                gradient += g * (strength * height_mm);
+                cavity += 0.4 * strength * smoothstep(0.5, 0.15, n);
+            }
+        }
+        let fine = [
+            // Lids: two crossing sets of fine lines.
+            (r.lids, 34.0, 2.6, 0.75, 0.016, 21u32),
+            (r.lids, -30.0, 2.6, 0.75, 0.016, 22),
+            (r.under_eye, -16.0, 5.0, 1.3, 0.016, 23),
+            (r.forehead * (1.0 - r.scalp), 2.0, 12.0, 2.2, 0.012, 24),
+            // Neck: rings and a crossing net.
+            (r.neck, 0.0, 70.0, 15.0, 0.22, 25),
+            (r.neck, 24.0, 7.0, 2.0, 0.030, 26),
+            (r.neck, -24.0, 7.0, 2.0, 0.030, 27),
+        ];
+        for (weight, degrees, along, across, height_mm, seed) in fine {
+            let strength = weight * dry * self.held(0.6 * across);
+            if strength > 0.01 {
+                let mirrored = if p.x < 0.0 { -degrees } else { degrees };
+                let (_, g) = grooved(line_noise(c, mirrored, along, across, self.seed ^ seed), 0.06);
+                gradient += g * (strength * height_mm * self.coarseness);
+            }
+        }
+        ReliefSample { gradient, cavity: cavity.min(1.0) }
+    }
+
+    /// Polygonal net: gradient per mm of depth, and nearness of a furrow.
+    fn furrows(&self, site: &Site, tension: Vec2, r: &Regions) -> (Vec3, f32) {
+        let mesh_mm = (0.62f32).max(1.6 * self.finest_mm) * (1.0 + 0.2 * r.neck.round());
+        let metric = Metric::new(site.place, tension, 1.9);
+        let (mut first, mut second) = (f32::MAX, f32::MAX);
+        let (mut at_first, mut at_second) = (Vec3::ZERO, Vec3::ZERO);
+        features(site.place / mesh_mm, self.seed ^ 0xf0, |_, d| {
+            let m = metric.apply(d);
+            let length2 = d.dot(m);
+            if length2 < first {
+                (second, at_second) = (first, at_first);
+                (first, at_first) = (length2, m);
+            } else if length2 < second {
+                (second, at_second) = (length2, m);
+            }
+        });
+        let (f1, f2) = (first.sqrt().max(1e-4), second.sqrt().max(1e-4));
+        const WIDTH: f32 = 0.24;
+        let gap = (f2 - f1) / WIDTH;
+        let groove = (-gap * gap).exp();
+        let slope = 2.0 * gap / WIDTH * groove / mesh_mm;
+        ((at_second / f2 - at_first / f1) * slope, groove)
+    }
+
+    /// Round pits in the plane of the surface: gradient per mm of depth, and nearness of a pit's bottom.
+    fn pores(
+        &self,
+        site: &Site,
+        metric: &Metric,
+        layer: u32,
+        spacing_mm: f32,
+        radius_mm: f32,
+        share: f32,
+    ) -> (Vec3, f32) {
+        let (mut gradient, mut depth) = (Vec3::ZERO, 0.0f32);
+        // A map too coarse for a pore shows a wider and shallower one.
+        let radius_mm = radius_mm.max(0.7 * self.finest_mm);
+        let spacing_mm = spacing_mm.max(3.0 * radius_mm);
+        features(site.place / spacing_mm, self.seed ^ (0xb0 + layer), |h, d| {
+            let there = smoothstep(0.0, 0.12, share - unit(h));
+            let out = d.dot(site.normal);
+            // Features far above or below the surface do not reach it.
+            let reach = there * smoothstep(0.62, 0.38, out.abs());
+            if reach > 0.0 {
+                let d = d - site.normal * out;
+                let m = metric.apply(d);
+                let size = radius_mm * (0.75 + 0.55 * unit(h.wrapping_mul(0x2545_f491))) / spacing_mm;
+                let t = 1.0 - d.dot(m) / (size * size);
+                if t > 0.0 {
+                    let strength = reach * (0.5 + 0.8 * unit(h.wrapping_mul(0x85eb_ca6b)));
+                    gradient += m * (strength * 4.0 * t / (size * size * spacing_mm));
+                    depth += strength * t * t;
+                }
+            }
+        });
+        (gradient, depth.min(1.0))
+    }
+}

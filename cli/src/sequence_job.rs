@@ -1,0 +1,377 @@
+//! The main job: a sequence of shots to a folder of frames, with everything that a review needs beside them.
+//!
+//! ```text
+//! heads, rig, sequence --evaluate--> shots --studio--> frame.0001.png ...
+//!                                      |                   +--> contact_sheet.png, video.mp4
+//!                                      +--> animated head.glb        stats.json
+//! ```
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use image::RgbImage;
+use rubor_assets::export;
+use rubor_renderer::{Gpu, Image, Renderer, Settings};
+use rubor_rig::evaluate::{Evaluator, Shot};
+use rubor_rig::expression::Rig;
+use rubor_rig::head::{Head, Material};
+use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
+use rubor_rig::skin::kernel::SeparableKernel;
+use rubor_rig::skin::profile::Profile;
+use rubor_rig::timeline::Sequence;
+use serde_json::json;
+
+use crate::failure::{Failure, Outcome};
+use crate::inputs::LoadedHead;
+use crate::progress::Progress;
+use crate::studio::Studio;
+use crate::video::Video;
+use crate::{contact_sheet, output, video};
+
+/// What `render` and `demo` have in common.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Folder for the results; made if missing
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Size of a frame in pixels [default: the sequence's, else 640x640]
+    #[arg(long, value_parser = crate::inputs::parse_size, value_name = "WxH")]
+    pub(crate) size: Option<[u32; 2]>,
+    /// Frames a second [default: the sequence's]
+    #[arg(long)]
+    pub(crate) fps: Option<f64>,
+    /// Subsurface scattering: none, or separable:N with an odd N from 5 to 65
+    #[arg(long, default_value = "separable:17", value_parser = parse_scatter, value_name = "METHOD")]
+    pub(crate) scatter: Scatter,
+    /// Antialiasing: none, or ssaa:N with N x N samples a pixel
+    #[arg(long, default_value = "ssaa:2", value_parser = parse_antialias, value_name = "METHOD")]
+    pub(crate) antialias: Antialias,
+    /// Factor of the light before the tone map
+    #[arg(long, default_value_t = 2.4)]
+    pub(crate) exposure: f32,
+    /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
+    #[arg(long, value_name = "NAME")]
+    pub(crate) adapter: Option<String>,
+    /// Keep the frames that a stopped run of the same job left
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Make no video
+    #[arg(long)]
+    pub(crate) no_video: bool,
+    /// Write no animated head
+    #[arg(long)]
+    pub(crate) no_export: bool,
+    /// Print the statistics as JSON on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// A scattering method by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scatter {
+    None,
+    Separable(usize),
+}
+
+/// An antialiasing method by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Antialias {
+    None,
+    Supersampling(u32),
+}
+
+fn parse_scatter(text: &str) -> Result<Scatter, String> {
+    if text == "none" {
+        return Ok(Scatter::None);
+    }
+    let samples = text.strip_prefix("separable:").and_then(|n| n.parse().ok());
+    match samples {
+        Some(n) if n % 2 == 1 && (5..=65).contains(&n) => Ok(Scatter::Separable(n)),
+        _ => Err(format!("found {text:?}, expected none, or separable:N with an odd N from 5 to 65")),
+    }
+}
+
+fn parse_antialias(text: &str) -> Result<Antialias, String> {
+    if text == "none" {
+        return Ok(Antialias::None);
+    }
+    match text.strip_prefix("ssaa:").and_then(|n| n.parse().ok()) {
+        Some(n) if (1..=8).contains(&n) => Ok(Antialias::Supersampling(n)),
+        _ => Err(format!("found {text:?}, expected none, or ssaa:N with N from 1 to 8")),
+    }
+}
+
+/// What to draw.
+pub(crate) struct Job {
+    pub(crate) heads: Vec<LoadedHead>,
+    pub(crate) rig: Rig,
+    pub(crate) sequence: Sequence,
+}
+
+/// Names of the results in the output folder.
+const JOB_FILE: &str = "job.json";
+const STATS_FILE: &str = "stats.json";
+const SHEET_FILE: &str = "contact_sheet.png";
+const VIDEO_FILE: &str = "video.mp4";
+const HEAD_FILE: &str = "animated_head.glb";
+/// Share of the width of a head that is left free between two of them.
+const SPACING: f32 = 1.05;
+
+/// Does the job.
+pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
+    let started = Instant::now();
+    if let Some(fps) = arguments.fps {
+        job.sequence.fps = fps;
+    }
+    let size = arguments.size.or(job.sequence.size).unwrap_or([640, 640]);
+    let settings = settings(size, arguments)?;
+    let mut evaluators = Vec::new();
+    for loaded in &job.heads {
+        let (evaluator, notes) = Evaluator::new(&loaded.head, &job.rig, &job.sequence)?;
+        for note in notes {
+            eprintln!("note: head {:?}: {note}", loaded.head.name);
+        }
+        evaluators.push(evaluator);
+    }
+    let Some(first) = evaluators.first() else { return Err(Failure::input("there is no head to draw")) };
+    let frames = first.frame_count();
+    let renderer = Renderer::new(Gpu::new(arguments.adapter.as_deref())?)?;
+
+    output::folder(&arguments.output)?;
+    let is_new = claim_folder(&job, size, arguments)?;
+    let heads: Vec<&Head> = job.heads.iter().map(|h| &h.head).collect();
+    let spacing = heads.iter().map(|h| width(h)).fold(0.0, f32::max) * SPACING;
+    let mut studio = Studio::new(renderer, &heads)?;
+
+    let mut sheet = Vec::new();
+    let on_sheet = contact_sheet::choose(frames);
+    let mut times = PassTimes::default();
+    let mut first_frame_s = None;
+    let mut drawn = Vec::new();
+    let mut progress = Progress::new("frames", u64::from(frames));
+    for frame in 0..frames {
+        let path = frame_path(&arguments.output, frame);
+        let kept = if is_new { None } else { read_frame(&path, size) };
+        let picture = match kept {
+            Some(picture) => picture,
+            None => {
+                let at = Instant::now();
+                let mut shots: Vec<Shot> = evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
+                step_back(&mut shots);
+                let (image, stats) = studio.render(&shots, spacing, &settings)?;
+                let picture = opaque(image);
+                write_png(&path, &picture)?;
+                first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
+                drawn.push(at.elapsed().as_secs_f64());
+                times.add(&stats);
+                picture
+            }
+        };
+        if on_sheet.contains(&frame) {
+            sheet.push(contact_sheet::reduce(&picture));
+        }
+        progress.step();
+    }
+    progress.finish();
+
+    write_png(&arguments.output.join(SHEET_FILE), &contact_sheet::page(&sheet))?;
+    if !arguments.no_video {
+        let path = arguments.output.join(VIDEO_FILE);
+        if let Video::NoEncoder = video::encode(&arguments.output, 1, job.sequence.fps, &path)? {
+            eprintln!("note: no video: the program ffmpeg is not on this machine (Debian, Ubuntu: ffmpeg)");
+        }
+    }
+    if !arguments.no_export {
+        export_animated(&job, &evaluators, &arguments.output)?;
+    }
+    let gpu = &studio.renderer.gpu().info;
+    let stats = json!({
+        "adapter": { "name": gpu.name, "backend": format!("{:?}", gpu.backend), "driver": gpu.driver_info },
+        "size": size,
+        "frames": frames,
+        "framesDrawn": drawn.len(),
+        "scatter": format!("{:?}", arguments.scatter),
+        "antialias": format!("{:?}", arguments.antialias),
+        "secondsToFirstFrame": first_frame_s,
+        "secondsPerFrame": median(&mut drawn),
+        "gpuMillisecondsPerPass": times.medians(),
+        "triangles": times.triangles,
+        "deviceMemoryBytes": times.memory_bytes,
+    });
+    let text = serde_json::to_string_pretty(&stats).map_err(Failure::job)?;
+    output::write(&arguments.output.join(STATS_FILE), text.as_bytes())?;
+    if arguments.json {
+        println!("{text}");
+    } else {
+        println!("{frames} frames in {}", arguments.output.display());
+    }
+    Ok(())
+}
+
+fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
+    let scatter = match arguments.scatter {
+        Scatter::None => None,
+        Scatter::Separable(n) => Some(SeparableKernel::of(&Profile::deon_six(), n).map_err(Failure::input)?),
+    };
+    let supersampling = match arguments.antialias {
+        Antialias::None => 1,
+        Antialias::Supersampling(n) => n,
+    };
+    Ok(Settings { size, scatter, supersampling, shadow_size: 2048, exposure: arguments.exposure })
+}
+
+/// Writes down what job the folder holds. False where a stopped run of the same job goes on.
+fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<bool> {
+    let content = json!({
+        "heads": job.heads.iter().map(|h| format!("{:016x}", h.fingerprint)).collect::<Vec<_>>(),
+        "rig": job.rig,
+        "sequence": job.sequence,
+        "size": size,
+        "scatter": format!("{:?}", arguments.scatter),
+        "antialias": format!("{:?}", arguments.antialias),
+        "exposure": arguments.exposure,
+        "program": env!("CARGO_PKG_VERSION"),
+    });
+    let text = serde_json::to_string_pretty(&content).map_err(Failure::job)?;
+    let path = arguments.output.join(JOB_FILE);
+    if arguments.resume && path.is_file() {
+        let before = std::fs::read_to_string(&path)
+            .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))?;
+        if before != text {
+            return Err(Failure::input(format!(
+                "{}: found the frames of another job, expected those of this one",
+                arguments.output.display()
+            ))
+            .hint("leave out --resume to draw all frames again, or choose another folder"));
+        }
+        return Ok(false);
+    }
+    output::write(&path, text.as_bytes())?;
+    Ok(true)
+}
+
+/// Frames are numbered from 1.
+fn frame_path(folder: &Path, frame: u32) -> PathBuf {
+    folder.join(format!("frame.{:04}.png", frame + 1))
+}
+
+/// A frame that is there, whole and of the right size.
+fn read_frame(path: &Path, size: [u32; 2]) -> Option<RgbImage> {
+    let image = image::open(path).ok()?.into_rgb8();
+    (image.dimensions() == (size[0], size[1])).then_some(image)
+}
+
+fn opaque(image: Image) -> RgbImage {
+    RgbImage::from_fn(image.width, image.height, |x, y| {
+        let i = 4 * (y as usize * image.width as usize + x as usize);
+        image::Rgb([image.rgba[i], image.rgba[i + 1], image.rgba[i + 2]])
+    })
+}
+
+fn write_png(path: &Path, picture: &RgbImage) -> Outcome {
+    output::commit(path, |partial| picture.save(partial).map_err(std::io::Error::other))
+}
+
+fn width(head: &Head) -> f32 {
+    head.bounds().map_or(0.0, |(low, high)| high.x - low.x)
+}
+
+/// Several heads side by side are seen from further away.
+fn step_back(shots: &mut [Shot]) {
+    let n = shots.len() as f32;
+    if let Some(first) = shots.first_mut()
+        && n > 1.0
+    {
+        let camera = &mut first.camera;
+        camera.position = camera.target + (camera.position - camera.target) * n;
+    }
+}
+
+/// Writes the (first) head with its performance as morph weights and node motion.
+fn export_animated(job: &Job, evaluators: &[Evaluator], folder: &Path) -> Outcome {
+    let (Some(loaded), Some(evaluator)) = (job.heads.first(), evaluators.first()) else { return Ok(()) };
+    let frames = (0..evaluator.frame_count())
+        .map(|i| {
+            let shot = evaluator.at(evaluator.frame_time_s(i));
+            export::gltf::Frame {
+                time_s: shot.time_s as f32,
+                weights: shot.face.shapes,
+                rotation: shot.face.head_rotation,
+                translation: shot.face.head_translation,
+            }
+        })
+        .collect();
+    let options = export::gltf::Options {
+        base_color: neutral_color(&loaded.head),
+        rig: Some(serde_json::to_value(&job.rig).map_err(Failure::job)?),
+        frames,
+        ..export::gltf::Options::default()
+    };
+    export::gltf::write(&loaded.head, &options, &folder.join(HEAD_FILE)).map_err(Failure::job)
+}
+
+/// The skin of the neutral face as other viewers show it: sRGB, from the chromophore maps.
+pub(crate) fn neutral_color(head: &Head) -> Option<RgbImage> {
+    let maps = &head.maps;
+    let (melanin, hemoglobin) = (maps.melanin.as_ref()?, maps.hemoglobin.as_ref()?);
+    if !head.mesh.parts.iter().any(|p| p.material == Material::Skin) {
+        return None;
+    }
+    let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
+    let side = melanin.width.max(hemoglobin.width).min(2048);
+    Some(RgbImage::from_fn(side, side, |x, y| {
+        let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
+        let skin = lookup.sample(melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));
+        let hair = maps.hair.as_ref().map_or(0.0, |h| h.sample(u, v, 0));
+        let rgb = std::array::from_fn(|c| skin[c] + hair * (maps.hair_color_linear[c] - skin[c]));
+        image::Rgb(rgb.map(|c| (rubor_rig::color::srgb_encode(c) * 255.0).round() as u8))
+    }))
+}
+
+/// GPU times over frames.
+#[derive(Default)]
+struct PassTimes {
+    by_pass: BTreeMap<&'static str, Vec<f64>>,
+    triangles: u64,
+    memory_bytes: u64,
+}
+
+impl PassTimes {
+    fn add(&mut self, stats: &rubor_renderer::FrameStats) {
+        let mut frame: BTreeMap<&'static str, f64> = BTreeMap::new();
+        for (name, ms) in &stats.passes_ms {
+            *frame.entry(name).or_default() += ms;
+        }
+        for (name, ms) in frame {
+            self.by_pass.entry(name).or_default().push(ms);
+        }
+        self.triangles = stats.triangles;
+        self.memory_bytes = stats.memory_bytes;
+    }
+
+    fn medians(&mut self) -> BTreeMap<&'static str, Option<f64>> {
+        self.by_pass.iter_mut().map(|(name, ms)| (*name, median(ms))).collect()
+    }
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn methods_are_read_by_name() {
+        assert_eq!(parse_scatter("separable:17"), Ok(Scatter::Separable(17)));
+        assert_eq!(parse_scatter("none"), Ok(Scatter::None));
+        for wrong in ["separable:16", "separable:67", "separable", "gauss"] {
+            assert!(parse_scatter(wrong).unwrap_err().contains(wrong));
+        }
+        assert_eq!(parse_antialias("ssaa:4"), Ok(Antialias::Supersampling(4)));
+        assert!(parse_antialias("ssaa:0").is_err());
+    }
+}

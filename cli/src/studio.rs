@@ -1,0 +1,144 @@
+//! From a shot of the rig to a scene of the renderer.
+
+use std::collections::BTreeMap;
+
+use glam::{Mat4, Vec3};
+use rubor_renderer::{
+    Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind, Renderer,
+    Scene, Settings,
+};
+use rubor_rig::evaluate::{EnvironmentState, LightState, Shot};
+use rubor_rig::head::Head;
+use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
+
+use crate::failure::{Failure, Outcome};
+
+/// Radiance behind the heads: a grey that a face is neither lost nor dazzled before.
+const BACKDROP_LINEAR: Vec3 = Vec3::new(0.035, 0.038, 0.042);
+/// Side of the skin colour table (see `rubor_rig::skin::chromophores` for its error).
+const COLOR_TABLE_SIDE: u32 = 64;
+/// Radius of a lamp with a place, metres: a soft box of 24 cm.
+const LAMP_RADIUS_METRES: f32 = 0.12;
+/// Tangent of the angular radius of a directional light.
+const DISTANT_LAMP_RADIUS: f32 = 0.05;
+
+/// A renderer with the heads and environments that shots name.
+pub(crate) struct Studio {
+    pub(crate) renderer: Renderer,
+    heads: Vec<HeadOnGpu>,
+    environments: BTreeMap<String, Environment>,
+}
+
+impl Studio {
+    pub(crate) fn new(renderer: Renderer, heads: &[&Head]) -> Outcome<Self> {
+        let lookup = SkinModel::new(&ChromophoreModel::default()).bake(COLOR_TABLE_SIDE, COLOR_TABLE_SIDE);
+        let color = ColorTable { width: lookup.width, height: lookup.height, texels: &lookup.texels };
+        let heads = heads
+            .iter()
+            .map(|head| HeadOnGpu::new(renderer.gpu(), head, &color))
+            .collect::<Result<_, _>>()?;
+        Ok(Self { renderer, heads, environments: BTreeMap::new() })
+    }
+
+    /// Draws a shot of one head, or of several that stand side by side `spacing` metres apart.
+    pub(crate) fn render(
+        &mut self,
+        shots: &[Shot],
+        spacing: f32,
+        settings: &Settings,
+    ) -> Outcome<(rubor_renderer::Image, rubor_renderer::FrameStats)> {
+        let Some(first) = shots.first() else { return Err(Failure::job("there is no head to draw")) };
+        if let Some(environment) = &first.environment {
+            self.load_environment(environment)?;
+        }
+        let middle = (shots.len() as f32 - 1.0) / 2.0;
+        let instances: Vec<_> = self
+            .heads
+            .iter()
+            .zip(shots)
+            .enumerate()
+            .map(|(i, (head, shot))| HeadInstance {
+                head,
+                state: &shot.face,
+                world_from_head: Mat4::from_translation(Vec3::X * ((i as f32 - middle) * spacing)),
+            })
+            .collect();
+        let lights: Vec<_> = first.lights.iter().map(light).collect();
+        let environment = first.environment.as_ref().and_then(|e| self.environments.get(&key(e)));
+        let scene = Scene {
+            heads: &instances,
+            camera: Camera {
+                position: first.camera.position,
+                target: first.camera.target,
+                up: first.camera.up,
+                fov_degrees: first.camera.fov_y.to_degrees(),
+            },
+            lights: &lights,
+            environment,
+            environment_intensity: first.environment.as_ref().map_or(0.0, |e| e.intensity),
+            background_linear: BACKDROP_LINEAR,
+        };
+        Ok(self.renderer.render(&scene, settings)?)
+    }
+
+    fn load_environment(&mut self, state: &EnvironmentState) -> Outcome {
+        let key = key(state);
+        if self.environments.contains_key(&key) {
+            return Ok(());
+        }
+        let map = match state.name.as_str() {
+            "studio" => EnvironmentMap::studio(),
+            path => load_map(path)?,
+        };
+        let environment = map.rotated(state.rotation_y.to_degrees()).upload(self.renderer.gpu());
+        self.environments.insert(key, environment);
+        Ok(())
+    }
+}
+
+/// An environment is filtered once for each place that it is turned to; whole degrees are fine enough for soft light.
+fn key(state: &EnvironmentState) -> String {
+    format!("{}@{}", state.name, state.rotation_y.to_degrees().round())
+}
+
+fn load_map(path: &str) -> Outcome<EnvironmentMap> {
+    let wrong = |e: &dyn std::fmt::Display| {
+        Failure::input(format!("environment {path:?}: {e}")).hint(
+            "built in is \"studio\"; anything else is the path of an equirectangular .hdr or .exr image",
+        )
+    };
+    if !std::path::Path::new(path).is_file() {
+        return Err(wrong(&"no such file, and no built-in environment of that name"));
+    }
+    let image = image::ImageReader::open(path)
+        .map_err(|e| wrong(&e))?
+        .with_guessed_format()
+        .map_err(|e| wrong(&e))?
+        .decode()
+        .map_err(|e| wrong(&e))?
+        .to_rgb32f();
+    let texels: Vec<Vec3> = image.pixels().map(|p| Vec3::from_array(p.0)).collect();
+    if texels.iter().any(|t| !t.is_finite() || t.min_element() < 0.0) {
+        return Err(wrong(&"found a negative or infinite radiance, expected finite ones of 0 or more"));
+    }
+    Ok(EnvironmentMap { width: image.width(), height: image.height(), texels })
+}
+
+fn light(state: &LightState) -> Light {
+    use rubor_rig::timeline::LightKind as Kind;
+    let (kind, radius) = match state.kind {
+        Kind::Directional => (LightKind::Directional { direction: state.direction }, DISTANT_LAMP_RADIUS),
+        Kind::Spot => {
+            let [inner, outer] = state.cone_half_angles.map(f32::to_degrees);
+            let spot = LightKind::Spot {
+                position: state.position,
+                direction: state.direction,
+                inner_degrees: inner,
+                outer_degrees: outer,
+            };
+            (spot, LAMP_RADIUS_METRES)
+        }
+        Kind::Point => (LightKind::Point { position: state.position }, LAMP_RADIUS_METRES),
+    };
+    Light { kind, color_linear: state.power_linear, radius, casts_shadow: state.shadow }
+}

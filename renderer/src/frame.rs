@@ -1,0 +1,514 @@
+//! A frame: every pass, in order, and the images between them.
+
+use glam::{Mat4, Vec3};
+use rubor_rig::skin::kernel::SeparableKernel;
+use serde::Serialize;
+
+use crate::error::RenderError;
+use crate::gpu::{Gpu, PassTimer};
+use crate::head::HeadOnGpu;
+use crate::passes::appearance::{Appearance, Blended};
+use crate::passes::compose::Compose;
+use crate::passes::display::Display;
+use crate::passes::morph::Morph;
+use crate::passes::overlay::Overlay;
+use crate::passes::scatter::Scatter;
+use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded};
+use crate::passes::shadow::{LightView, Shadow};
+use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
+use crate::passes::visibility::Visibility;
+use crate::scene::{Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
+
+/// How frames are made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Pixels of the image.
+    pub size: [u32; 2],
+    /// Scattering kernel; without one light does not scatter.
+    pub scatter: Option<SeparableKernel>,
+    /// Pixels of the frame on a side of a pixel of the image (1 to 8): `ssaa`.
+    pub supersampling: u32,
+    /// Texels on a side of a shadow map.
+    pub shadow_size: u32,
+    /// Factor of radiance before the tone map.
+    pub exposure: f32,
+}
+
+/// An image of the frame, rows from the top.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// RGBA, sRGB transfer; alpha is coverage (not premultiplied).
+    pub rgba: Vec<u8>,
+}
+
+/// What a frame cost.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FrameStats {
+    /// GPU milliseconds of each pass, in order; empty where the adapter has no timestamps.
+    pub passes_ms: Vec<(&'static str, f64)>,
+    /// Triangles of all heads.
+    pub triangles: u64,
+    /// Bytes of heads, buffers and images on the device.
+    pub memory_bytes: u64,
+}
+
+/// The view as view.wgsl reads it.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct View {
+    pub(crate) clip_from_world: Mat4,
+    pub(crate) previous_clip_from_world: Mat4,
+    pub(crate) origin: [f32; 4],
+    pub(crate) right: [f32; 4],
+    pub(crate) up: [f32; 4],
+    pub(crate) forward: [f32; 4],
+    pub(crate) size: [u32; 2],
+    pub(crate) head_count: u32,
+    pub(crate) has_environment: u32,
+    pub(crate) jitter: [f32; 2],
+    pub(crate) near: f32,
+    pub(crate) light_count: u32,
+}
+
+/// Draws scenes. Keeps pipelines, and images of the last size, between frames; nothing else carries over.
+pub struct Renderer {
+    gpu: Gpu,
+    morph: Morph,
+    surface_frames: SurfaceFrames,
+    appearance: Appearance,
+    shadow: Shadow,
+    visibility: Visibility,
+    shade: Shade,
+    scatter: Scatter,
+    compose: Compose,
+    overlay: Overlay,
+    display: Display,
+    targets: Option<Targets>,
+    instances: Vec<Instance>,
+    timer: PassTimer,
+}
+
+/// Images between passes.
+struct Targets {
+    size: [u32; 2],
+    ids: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    irradiance: wgpu::TextureView,
+    albedo: wgpu::TextureView,
+    direct: wgpu::TextureView,
+    scratch: wgpu::TextureView,
+    scattered: wgpu::TextureView,
+    hdr: wgpu::TextureView,
+    image: wgpu::Texture,
+    shadows: wgpu::Texture,
+}
+
+/// Buffers of one head of a scene.
+struct Instance {
+    positions: wgpu::Buffer,
+    frames: wgpu::Buffer,
+    blended: Blended,
+}
+
+impl Targets {
+    fn new(gpu: &Gpu, size: [u32; 2], image_size: [u32; 2], shadow_size: u32, shadow_layers: u32) -> Self {
+        use wgpu::TextureFormat::{Depth32Float, R32Uint, Rgba8Unorm, Rgba16Float};
+        use wgpu::TextureUsages as Use;
+        let view = |label, format, usage| {
+            gpu.target(label, size, format, usage | Use::TEXTURE_BINDING | Use::COPY_SRC)
+                .create_view(&Default::default())
+        };
+        let storage = Use::STORAGE_BINDING;
+        let shadows = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("shadows"),
+            size: wgpu::Extent3d {
+                width: shadow_size,
+                height: shadow_size,
+                depth_or_array_layers: shadow_layers.max(1),
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: Depth32Float,
+            usage: Use::RENDER_ATTACHMENT | Use::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        Self {
+            size,
+            ids: view("ids", R32Uint, Use::RENDER_ATTACHMENT),
+            depth: view("depth", Depth32Float, Use::RENDER_ATTACHMENT),
+            irradiance: view("irradiance", Rgba16Float, storage),
+            albedo: view("albedo", Rgba16Float, storage),
+            direct: view("direct", Rgba16Float, storage),
+            scratch: view("scratch", Rgba16Float, storage),
+            scattered: view("scattered", Rgba16Float, storage),
+            hdr: view("hdr", Rgba16Float, storage | Use::RENDER_ATTACHMENT),
+            image: gpu.target(
+                "image",
+                image_size,
+                Rgba8Unorm,
+                storage | Use::COPY_SRC | Use::TEXTURE_BINDING,
+            ),
+            shadows,
+        }
+    }
+
+    fn matches(&self, settings: &Settings, shadow_layers: u32) -> bool {
+        let image = [self.image.width(), self.image.height()];
+        self.size == settings.size.map(|n| n * settings.supersampling)
+            && image == settings.size
+            && self.shadows.width() == settings.shadow_size
+            && self.shadows.depth_or_array_layers() >= shadow_layers
+    }
+
+    fn bytes(&self) -> u64 {
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        let image = u64::from(self.image.width()) * u64::from(self.image.height()) * 4;
+        let s = self.shadows.size();
+        let shadow = u64::from(s.width) * u64::from(s.height) * u64::from(s.depth_or_array_layers) * 4;
+        pixels * (4 + 4 + 6 * 8) + image + shadow
+    }
+}
+
+impl Renderer {
+    /// Compiles the passes.
+    ///
+    /// # Errors
+    /// The device refused a pipeline.
+    pub fn new(gpu: Gpu) -> Result<Self, RenderError> {
+        let renderer = Self {
+            morph: Morph::new(&gpu),
+            surface_frames: SurfaceFrames::new(&gpu),
+            appearance: Appearance::new(&gpu),
+            shadow: Shadow::new(&gpu),
+            visibility: Visibility::new(&gpu),
+            shade: Shade::new(&gpu),
+            scatter: Scatter::new(&gpu),
+            compose: Compose::new(&gpu),
+            overlay: Overlay::new(&gpu),
+            display: Display::new(&gpu),
+            targets: None,
+            instances: Vec::new(),
+            timer: PassTimer::new(&gpu),
+            gpu,
+        };
+        renderer.gpu.check()?;
+        Ok(renderer)
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Draws a scene and waits for the picture.
+    ///
+    /// # Errors
+    /// A size, a count or a value outside the limits; the device failed.
+    pub fn render(
+        &mut self,
+        scene: &Scene<'_>,
+        settings: &Settings,
+    ) -> Result<(Image, FrameStats), RenderError> {
+        self.check(scene, settings)?;
+        let shadow_layers = scene.lights.iter().filter(|l| l.casts_shadow).count() as u32;
+        if !self.targets.as_ref().is_some_and(|t| t.matches(settings, shadow_layers)) {
+            let size = settings.size.map(|n| n * settings.supersampling);
+            self.targets =
+                Some(Targets::new(&self.gpu, size, settings.size, settings.shadow_size, shadow_layers));
+        }
+        self.fit_instances(scene);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.record_frame(&mut encoder, scene, settings);
+        self.gpu.queue.submit([encoder.finish()]);
+        let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
+        let rgba = self.gpu.read_texture(&targets.image)?;
+        let stats = FrameStats {
+            passes_ms: self.timer.read(&self.gpu)?,
+            triangles: scene
+                .heads
+                .iter()
+                .map(|h| u64::from(h.head.opaque_triangles + h.head.overlay_triangles))
+                .sum(),
+            memory_bytes: targets.bytes() + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>(),
+        };
+        Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
+    }
+
+    /// Deformed points of the first head of the last frame, world space, metres.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_positions(&self) -> Result<Vec<Vec3>, RenderError> {
+        let Some(instance) = self.instances.first() else { return Ok(Vec::new()) };
+        let bytes = self.gpu.read_buffer(&instance.positions)?;
+        let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect())
+    }
+
+    fn check(&self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
+        let limit = |what, found: String, expected: String| Err(RenderError::Limit { what, found, expected });
+        let most = self.gpu.device.limits().max_texture_dimension_2d;
+        let [w, h] = settings.size;
+        if w == 0 || h == 0 || w > most || h > most {
+            let expected = format!("1x1 to {most}x{most} on {}", self.gpu.info.name);
+            return limit("image size", format!("{w}x{h}"), expected);
+        }
+        let n = settings.supersampling;
+        if n == 0 || n > 8 || w * n > most || h * n > most {
+            let expected = format!("1 to 8, and a frame of at most {most} pixels on a side");
+            return limit("supersampling", n.to_string(), expected);
+        }
+        if settings.shadow_size < 16 || settings.shadow_size > most {
+            return limit("shadow map size", settings.shadow_size.to_string(), format!("16 to {most}"));
+        }
+        if !settings.exposure.is_finite() || settings.exposure < 0.0 {
+            return limit("exposure", settings.exposure.to_string(), "0 or more".into());
+        }
+        if scene.heads.len() > MAX_HEADS {
+            return limit("number of heads", scene.heads.len().to_string(), format!("at most {MAX_HEADS}"));
+        }
+        if scene.lights.len() > MAX_LIGHTS {
+            return limit(
+                "number of lights",
+                scene.lights.len().to_string(),
+                format!("at most {MAX_LIGHTS}"),
+            );
+        }
+        let c = scene.camera;
+        if !(c.fov_degrees > 0.0 && c.fov_degrees < 170.0) {
+            return limit(
+                "field of view",
+                format!("{} degrees", c.fov_degrees),
+                "above 0 and below 170".into(),
+            );
+        }
+        if !c.view_from_world().is_finite() {
+            let expected = "a finite position and a target apart from it".into();
+            return limit("camera", format!("{} looking at {}", c.position, c.target), expected);
+        }
+        for head in scene.heads {
+            let (found, expected) = (head.state.shapes.len(), head.head.shape_count);
+            if found != expected {
+                return limit(
+                    "number of shape weights",
+                    found.to_string(),
+                    format!("{expected}, one a shape"),
+                );
+            }
+            let numbers = [&head.state.shapes, &head.state.zones, &head.state.distributions];
+            if numbers.iter().any(|n| n.iter().any(|w| !w.is_finite()))
+                || !head.state.hemoglobin_scale.is_finite()
+            {
+                return limit("face state", "a weight that is not finite".into(), "finite weights".into());
+            }
+        }
+        Ok(())
+    }
+
+    fn fit_instances(&mut self, scene: &Scene<'_>) {
+        let gpu = &self.gpu;
+        for (i, head) in scene.heads.iter().enumerate() {
+            let points = u64::from(head.head.point_count) * 16;
+            let frames = u64::from(head.head.vertex_count) * FRAME_BYTES;
+            let fits = |n: &Instance| n.positions.size() == points && n.frames.size() == frames;
+            if self.instances.get(i).is_some_and(fits) {
+                continue;
+            }
+            let instance = Instance {
+                positions: gpu.storage_zeroed("positions", points),
+                frames: gpu.storage_zeroed("surface frames", frames),
+                blended: Blended::new(gpu),
+            };
+            self.instances.truncate(i);
+            self.instances.push(instance);
+        }
+    }
+
+    /// Every pass of a frame, in order.
+    fn record_frame(&mut self, encoder: &mut wgpu::CommandEncoder, scene: &Scene<'_>, settings: &Settings) {
+        let (gpu, timer) = (&self.gpu, &mut self.timer);
+        let Some(targets) = &self.targets else { return };
+        timer.restart();
+        let view = gpu.uniform("view", &view(scene, targets.size));
+        let heads: Vec<(&HeadOnGpu, &Instance)> =
+            scene.heads.iter().map(|h| h.head).zip(&self.instances).collect();
+        let drawn: Vec<_> = heads.iter().map(|(h, i)| (*h, &i.positions)).collect();
+
+        for (instance, (head, buffers)) in scene.heads.iter().zip(&heads) {
+            let weights = gpu.storage("shape weights", &instance.state.shapes);
+            let place = world_from_head(instance);
+            self.morph.record(gpu, encoder, timer, head, place, &weights, &buffers.positions);
+            self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
+            if let Some(maps) = &head.maps {
+                let state = instance.state;
+                self.appearance.record(
+                    gpu,
+                    encoder,
+                    timer,
+                    maps,
+                    &state.distributions,
+                    &state.zones,
+                    &buffers.blended,
+                );
+            }
+        }
+
+        let (lights, layers) = place_lights(scene, &targets.shadows);
+        for (light, layer) in &layers {
+            self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
+        }
+        self.visibility.record(gpu, encoder, timer, &view, &drawn, &targets.ids, &targets.depth);
+
+        let shadows = targets.shadows.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
+        let lighting = Lighting {
+            view: &view,
+            lights,
+            shadows: &shadows,
+            environment: scene.environment,
+            environment_intensity: scene.environment_intensity,
+            ids: &targets.ids,
+        };
+        let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
+        for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
+            let shaded = Shaded {
+                index: index as u32,
+                head,
+                positions: &buffers.positions,
+                frames: &buffers.frames,
+                blended: &buffers.blended,
+                hemoglobin_scale: instance.state.hemoglobin_scale,
+            };
+            self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
+        }
+
+        let mut diffuse = &targets.irradiance;
+        if let Some(kernel) = &settings.scatter {
+            let images = [&targets.irradiance, &targets.scratch, &targets.scattered];
+            self.scatter.record(gpu, encoder, timer, &view, kernel, &targets.depth, images);
+            diffuse = &targets.scattered;
+        }
+
+        let inputs = [diffuse, &targets.albedo, &targets.direct, &targets.depth];
+        self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
+        let overlays: Vec<_> = heads
+            .iter()
+            .filter(|(h, _)| h.overlay_triangles > 0)
+            .map(|(h, i)| (*h, &i.positions, &i.frames))
+            .collect();
+        if !overlays.is_empty() {
+            let ambient = average_light(scene);
+            let images = [&targets.depth, &targets.hdr];
+            self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
+        }
+
+        let image = targets.image.create_view(&Default::default());
+        let samples = settings.supersampling;
+        self.display.record(gpu, encoder, timer, settings.exposure, samples, &targets.hdr, &image);
+        timer.resolve(encoder);
+    }
+}
+
+fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
+    let camera = &scene.camera;
+    let aspect = size[0] as f32 / size[1] as f32;
+    let view_from_world = camera.view_from_world();
+    let world_from_view = view_from_world.inverse();
+    let tangent = (0.5 * camera.fov_degrees.to_radians()).tan();
+    let axis = |v: Vec3| world_from_view.transform_vector3(v).extend(0.0).to_array();
+    let clip_from_world = camera.clip_from_view(aspect) * view_from_world;
+    View {
+        clip_from_world,
+        previous_clip_from_world: clip_from_world,
+        origin: camera.position.extend(size[1] as f32 / (2.0 * tangent)).to_array(),
+        right: axis(Vec3::X * tangent * aspect),
+        up: axis(Vec3::Y * tangent),
+        forward: axis(Vec3::NEG_Z),
+        size,
+        head_count: scene.heads.len() as u32,
+        has_environment: u32::from(scene.environment.is_some()),
+        jitter: [0.0; 2],
+        near: NEAR_METRES,
+        light_count: scene.lights.len() as u32,
+    }
+}
+
+/// Placement of a head: its own motion first, then its place in the scene.
+fn world_from_head(instance: &crate::scene::HeadInstance<'_>) -> Mat4 {
+    instance.world_from_head
+        * Mat4::from_rotation_translation(instance.state.head_rotation, instance.state.head_translation)
+}
+
+/// Lights for the shader, and (view, layer) of those that cast shadows.
+fn place_lights(
+    scene: &Scene<'_>,
+    shadows: &wgpu::Texture,
+) -> ([GpuLight; MAX_LIGHTS], Vec<(LightView, wgpu::TextureView)>) {
+    let (center, radius) = bounding_sphere(scene);
+    let mut gpu_lights: [GpuLight; MAX_LIGHTS] = bytemuck::Zeroable::zeroed();
+    let mut layers = Vec::new();
+    for (slot, light) in gpu_lights.iter_mut().zip(scene.lights) {
+        let shadow = light.casts_shadow.then(|| {
+            let view = LightView::fit(&light.kind, center, radius);
+            let layer = layers.len() as u32;
+            let target = shadows.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer: layer,
+                array_layer_count: Some(1),
+                ..Default::default()
+            });
+            layers.push((view, target));
+            (layer, view)
+        });
+        *slot = GpuLight::new(light, shadow);
+    }
+    (gpu_lights, layers)
+}
+
+/// A sphere around all heads with room for their expressions, metres.
+fn bounding_sphere(scene: &Scene<'_>) -> (Vec3, f32) {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for instance in scene.heads {
+        let place = world_from_head(instance);
+        let (a, b) = instance.head.bounds;
+        for i in 0..8 {
+            let corner = Vec3::new(
+                if i & 1 == 0 { a.x } else { b.x },
+                if i & 2 == 0 { a.y } else { b.y },
+                if i & 4 == 0 { a.z } else { b.z },
+            );
+            let p = place.transform_point3(corner);
+            (low, high) = (low.min(p), high.max(p));
+        }
+    }
+    if low.x > high.x {
+        return (Vec3::ZERO, 1.0);
+    }
+    (0.5 * (low + high), 0.52 * (high - low).length())
+}
+
+/// Irradiance / pi that hair sees on average: the mean of the environment and half of the lamps that reach it.
+fn average_light(scene: &Scene<'_>) -> Vec3 {
+    let (center, _) = bounding_sphere(scene);
+    let lamps: Vec3 = scene
+        .lights
+        .iter()
+        .map(|l: &Light| match l.kind {
+            LightKind::Directional { .. } => l.color_linear,
+            LightKind::Spot { position, .. } | LightKind::Point { position } => {
+                l.color_linear / position.distance_squared(center).max(1e-4)
+            }
+        })
+        .sum();
+    let sky = scene.environment.map_or(Vec3::ZERO, |e| {
+        scene.environment_intensity * Vec3::new(e.harmonics[0][0], e.harmonics[0][1], e.harmonics[0][2])
+    });
+    sky + lamps * (0.25 / std::f32::consts::PI)
+}

@@ -1,0 +1,45 @@
+// Exposure, filmic tone map, sRGB transfer, and the average of samples x samples pixels of the frame.
+
+struct Params {
+    exposure: f32,
+    // Frame pixels on a side of an image pixel.
+    samples: u32,
+    padding_0: u32,
+    padding_1: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var hdr: texture_2d<f32>;
+@group(0) @binding(2) var image: texture_storage_2d<rgba8unorm, write>;
+
+// Hable 2010, "Uncharted 2: HDR lighting": shoulder, toe and linear part as one rational function.
+fn filmic_curve(x: vec3f) -> vec3f {
+    let a = 0.15; let b = 0.50; let c = 0.10; let d = 0.20; let e = 0.02; let f = 0.30;
+    return (x * (a * x + c * b) + d * e) / (x * (a * x + b) + d * f) - e / f;
+}
+
+// Linear value that becomes white.
+const WHITE = 11.2;
+
+// IEC 61966-2-1.
+fn srgb_from_linear(c: vec3f) -> vec3f {
+    let x = clamp(c, vec3f(0.0), vec3f(1.0));
+    return select(1.055 * pow(x, vec3f(1.0 / 2.4)) - 0.055, 12.92 * x, x <= vec3f(0.0031308));
+}
+
+@compute @workgroup_size(8, 8)
+fn display(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= textureDimensions(image)) {
+        return;
+    }
+    // The tone map comes before the average: a bright highlight must not swallow the edge that it stands on.
+    var sum = vec4f(0.0);
+    for (var y = 0u; y < params.samples; y++) {
+        for (var x = 0u; x < params.samples; x++) {
+            let c = textureLoad(hdr, id.xy * params.samples + vec2u(x, y), 0);
+            sum += vec4f(filmic_curve(params.exposure * c.rgb) / filmic_curve(vec3f(WHITE)), c.a);
+        }
+    }
+    sum /= f32(params.samples * params.samples);
+    textureStore(image, id.xy, vec4f(srgb_from_linear(sum.rgb), sum.a));
+}

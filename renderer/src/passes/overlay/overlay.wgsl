@@ -1,0 +1,72 @@
+// Lashes, hair cards and the wet film of the eye, blended over the picture.
+// Concatenated after view.wgsl, math.wgsl and surface.wgsl.
+
+struct Params {
+    // rgb = irradiance / pi that hair sees on average.
+    ambient: vec4f,
+    // First overlay triangle.
+    first: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<uniform> params: Params;
+@group(0) @binding(2) var<storage, read> positions: array<vec4f>;
+@group(0) @binding(3) var<storage, read> vertices: array<Vertex>;
+@group(0) @binding(4) var<storage, read> triangles: array<vec4u>;
+@group(0) @binding(5) var<storage, read> frames: array<SurfaceFrame>;
+
+// Numbers of rig's Material::ALL.
+const LASH = 5u;
+const HAIR = 6u;
+
+struct Corner {
+    @builtin(position) clip: vec4f,
+    @location(0) uv: vec2f,
+    @location(1) position: vec3f,
+    @location(2) normal: vec3f,
+    @location(3) @interpolate(flat, either) material: u32,
+}
+
+@vertex
+fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
+    let triangle = triangles[params.first + corner / 3u];
+    let index = triangle[corner % 3u];
+    let vertex = vertices[index];
+    let position = positions[vertex.point].xyz;
+    var clip = view.clip_from_world * vec4f(position, 1.0);
+    clip += vec4f(vec2f(2.0, -2.0) * view.jitter / vec2f(view.size) * clip.w, 0.0, 0.0);
+    return Corner(clip, vec2f(vertex.u, vertex.v), position, frames[index].normal, triangle.w);
+}
+
+// Strands across a card of unit width.
+const LASH_STRANDS = 46.0;
+
+// Premultiplied radiance and coverage.
+@fragment
+fn overlay_fragment(corner: Corner) -> @location(0) vec4f {
+    if corner.material == LASH || corner.material == HAIR {
+        // Lashes lean and cluster: each strand starts a little off and gets thinner towards its tip.
+        let strand = corner.uv.x * LASH_STRANDS;
+        let cell = floor(strand);
+        let random = fract(sin(cell * 127.1) * 43758.5453);
+        let lean = (random - 0.5) * 0.9 * corner.uv.y;
+        let across = abs(fract(strand) - 0.5 - 0.5 * lean);
+        let length = 0.65 + 0.35 * fract(random * 7.31);
+        let along = corner.uv.y / length;
+        let width = 0.34 * (1.0 - along);
+        let pixel = max(fwidth(strand), 1e-4);
+        // Coverage of a strand narrower than a pixel is its share of the pixel.
+        let sharp = clamp((width - across) / pixel + 0.5, 0.0, 1.0);
+        let coverage = select(mix(sharp, 2.0 * width, smoothstep(0.5, 1.5, pixel)), 0.0, along >= 1.0);
+        let color = vec3f(0.020, 0.013, 0.009) * params.ambient.rgb;
+        let alpha = clamp(0.92 * coverage, 0.0, 1.0);
+        return vec4f(color * alpha, alpha);
+    }
+    // A clear film: only its reflection at grazing angles adds light.
+    let to_viewer = normalize(view.origin.xyz - corner.position);
+    let fresnel = 0.02 + 0.98 * pow5(1.0 - abs(dot(normalize(corner.normal), to_viewer)));
+    return vec4f(params.ambient.rgb * 0.25 * fresnel, 0.0);
+}

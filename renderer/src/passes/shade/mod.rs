@@ -1,0 +1,226 @@
+//! Light on what is seen: one compute dispatch a head over the visibility buffer.
+//!
+//! ```text
+//! id, positions, frames, maps, blood, wrinkles, shadows, environment, lights
+//!     --shade--> irradiance (diffuse radiance of a white surface; a = scattering strength)
+//!              > albedo     (linear Rec. 709)
+//!              > direct     (specular, and all of what does not scatter)
+//! ```
+//!
+//! Theory: barycentrics and their screen derivatives from ray-plane volumes (exact under perspective); wrinkles as
+//! partial-derivative normals (papers/004 section 8.2); hemoglobin and skin colour (section 7.6); Kelemen and
+//! Szirmay-Kalos specular with the Beckmann distribution (papers/002, papers/004); percentage-closer soft shadows;
+//! order-2 spherical harmonics and a prefiltered map for the environment; multiple-bounce ambient occlusion.
+//!
+//! Differs from the sources: slope variance that minification hides widens the Beckmann lobe (Toksvig 2005), and so
+//! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
+//!
+//! Does not: transmit light through thin parts, reflect one part of the head in another.
+
+use glam::{Mat4, Vec3};
+
+use crate::environment::Environment;
+use crate::gpu::{Gpu, PassTimer};
+use crate::head::HeadOnGpu;
+use crate::passes::appearance::Blended;
+use crate::passes::shadow::LightView;
+use crate::scene::{Light, LightKind, MAX_LIGHTS};
+
+/// WGSL of the pass.
+pub(crate) const SHADER: &str = concat!(
+    include_str!("../../shared/view.wgsl"),
+    include_str!("../../shared/math.wgsl"),
+    include_str!("../../shared/surface.wgsl"),
+    include_str!("shade.wgsl")
+);
+
+/// A light as the shader reads it; the fields are described there.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct GpuLight {
+    pub(crate) clip_from_world: Mat4,
+    pub(crate) color: [f32; 4],
+    pub(crate) position: [f32; 4],
+    pub(crate) spot: [f32; 4],
+    pub(crate) shape: [f32; 4],
+    pub(crate) shadow: [f32; 4],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Params {
+    pub(crate) slope_scale: f32,
+    pub(crate) wrinkle_strength: f32,
+    pub(crate) hemoglobin_scale: f32,
+    pub(crate) head: u32,
+    pub(crate) environment_intensity: f32,
+    pub(crate) environment_levels: f32,
+    pub(crate) has_maps: u32,
+    pub(crate) wrinkle_map_count: u32,
+    pub(crate) hair_color: [f32; 4],
+    pub(crate) harmonics: [[f32; 4]; 9],
+    pub(crate) lights: [GpuLight; MAX_LIGHTS],
+}
+
+impl GpuLight {
+    /// A light with its shadow map, if it has one.
+    pub(crate) fn new(light: &Light, shadow: Option<(u32, LightView)>) -> Self {
+        let mut result: Self = bytemuck::Zeroable::zeroed();
+        result.color = light.color_linear.extend(light.radius).to_array();
+        result.spot[3] = -2.0;
+        match light.kind {
+            LightKind::Directional { direction } => {
+                result.position = (-direction.normalize_or(Vec3::NEG_Z)).extend(0.0).to_array();
+            }
+            LightKind::Point { position } => result.position = position.extend(1.0).to_array(),
+            LightKind::Spot { position, direction, outer_degrees, inner_degrees } => {
+                result.position = position.extend(1.0).to_array();
+                let outer = outer_degrees.to_radians().cos();
+                result.spot = direction.normalize_or(Vec3::NEG_Z).extend(outer).to_array();
+                // smoothstep needs two different edges.
+                result.shape[0] = inner_degrees.to_radians().cos().max(outer + 1e-4);
+            }
+        }
+        result.shape[1] = -1.0;
+        if let Some((layer, view)) = shadow {
+            result.clip_from_world = view.clip_from_world;
+            result.shape[1] = layer as f32;
+            result.shape[2] = view.near;
+            result.shape[3] = view.far;
+            result.shadow[0] = view.across;
+        }
+        result
+    }
+}
+
+/// What the pass reads that is the same for all heads of a frame.
+pub(crate) struct Lighting<'a> {
+    pub(crate) view: &'a wgpu::Buffer,
+    pub(crate) lights: [GpuLight; MAX_LIGHTS],
+    pub(crate) shadows: &'a wgpu::TextureView,
+    pub(crate) environment: Option<&'a Environment>,
+    pub(crate) environment_intensity: f32,
+    pub(crate) ids: &'a wgpu::TextureView,
+}
+
+/// What it reads of one head.
+pub(crate) struct Shaded<'a> {
+    pub(crate) index: u32,
+    pub(crate) head: &'a HeadOnGpu,
+    pub(crate) positions: &'a wgpu::Buffer,
+    pub(crate) frames: &'a wgpu::Buffer,
+    pub(crate) blended: &'a Blended,
+    pub(crate) hemoglobin_scale: f32,
+}
+
+/// The pipeline of the pass.
+pub(crate) struct Shade {
+    pipeline: wgpu::ComputePipeline,
+    trilinear_repeat: wgpu::Sampler,
+    linear_clamp: wgpu::Sampler,
+    compare: wgpu::Sampler,
+    black: wgpu::TextureView,
+    black_array: wgpu::TextureView,
+}
+
+impl Shade {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let linear = wgpu::SamplerDescriptor {
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        };
+        let sampler = |d: &wgpu::SamplerDescriptor<'_>| gpu.device.create_sampler(d);
+        let black = crate::texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]);
+        Self {
+            pipeline: gpu.compute_pipeline("shade", SHADER, "shade"),
+            trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
+                label: Some("trilinear repeat"),
+                address_mode_u: wgpu::AddressMode::Repeat,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                ..linear.clone()
+            }),
+            linear_clamp: sampler(&wgpu::SamplerDescriptor { label: Some("linear clamp"), ..linear.clone() }),
+            compare: sampler(&wgpu::SamplerDescriptor {
+                label: Some("shadow"),
+                compare: Some(wgpu::CompareFunction::LessEqual),
+                ..linear
+            }),
+            black_array: crate::texture::array_view(&black),
+            black,
+        }
+    }
+
+    /// Shades the pixels that see one head into (irradiance, albedo, direct); head 0 also clears where nothing is.
+    pub(crate) fn record(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        timer: &mut PassTimer,
+        lighting: &Lighting<'_>,
+        shaded: &Shaded<'_>,
+        outputs: [&wgpu::TextureView; 3],
+    ) {
+        let maps = shaded.head.maps.as_ref();
+        let params = Params {
+            slope_scale: 1.0,
+            wrinkle_strength: 1.0,
+            hemoglobin_scale: shaded.hemoglobin_scale,
+            head: shaded.index,
+            environment_intensity: lighting.environment_intensity,
+            environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
+            has_maps: u32::from(maps.is_some()),
+            wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
+            hair_color: maps.map_or([0.0; 4], |m| {
+                let [r, g, b] = m.hair_color_linear;
+                [r, g, b, 1.0]
+            }),
+            harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
+            lights: lighting.lights,
+        };
+        let params = gpu.uniform("shade", &params);
+        let texture = wgpu::BindingResource::TextureView;
+        let environment = lighting.environment.map_or(&self.black, |e| &e.filtered);
+        let shared = gpu.bind(
+            "shade: frame",
+            &self.pipeline,
+            0,
+            &[
+                lighting.view.as_entire_binding(),
+                params.as_entire_binding(),
+                texture(lighting.ids),
+                texture(lighting.shadows),
+                texture(environment),
+                wgpu::BindingResource::Sampler(&self.trilinear_repeat),
+                wgpu::BindingResource::Sampler(&self.linear_clamp),
+                wgpu::BindingResource::Sampler(&self.compare),
+            ],
+        );
+        let head = gpu.bind(
+            "shade: head",
+            &self.pipeline,
+            1,
+            &[
+                shaded.positions.as_entire_binding(),
+                shaded.head.vertices.as_entire_binding(),
+                shaded.head.triangles.as_entire_binding(),
+                shaded.frames.as_entire_binding(),
+                texture(maps.map_or(&self.black, |m| &m.skin)),
+                texture(maps.map_or(&self.black, |m| &m.gloss)),
+                texture(maps.map_or(&self.black, |m| &m.slopes)),
+                texture(maps.map_or(&self.black_array, |m| &m.wrinkles)),
+                texture(&shaded.blended.blood),
+                texture(&shaded.blended.wrinkles),
+                texture(&shaded.head.skin_color),
+            ],
+        );
+        let targets = gpu.bind("shade: targets", &self.pipeline, 2, &outputs.map(texture));
+        let mut pass = timer.compute(encoder, "shade");
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &shared, &[]);
+        pass.set_bind_group(1, &head, &[]);
+        pass.set_bind_group(2, &targets, &[]);
+        let size = outputs[0].texture().size();
+        pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+    }
+}

@@ -1,0 +1,478 @@
+// Light on the visible surface of one head.
+// Concatenated after view.wgsl, math.wgsl and surface.wgsl.
+
+struct Light {
+    clip_from_world: mat4x4f,
+    // rgb = irradiance at 1 m (or anywhere, for a directional light), w = source radius.
+    color: vec4f,
+    // xyz = place or unit direction from the scene to the light, w = 1 for a place, 0 for a direction.
+    position: vec4f,
+    // xyz = unit direction of a spot, w = cosine of its outer angle (-2 for no cone).
+    spot: vec4f,
+    // x = cosine of the inner angle, y = shadow layer or -1, z = near and w = far of the shadow map, metres.
+    shape: vec4f,
+    // x = metres across the shadow map at 1 m (or anywhere, for a directional light).
+    shadow: vec4f,
+}
+
+struct Params {
+    // Material constants of this head.
+    slope_scale: f32,
+    wrinkle_strength: f32,
+    hemoglobin_scale: f32,
+    head: u32,
+    environment_intensity: f32,
+    environment_levels: f32,
+    // 1 where the head has maps.
+    has_maps: u32,
+    wrinkle_map_count: u32,
+    // rgb = albedo of hair drawn with the skin.
+    hair_color: vec4f,
+    // Real spherical harmonics of the environment's irradiance / pi, rgb.
+    harmonics: array<vec4f, 9>,
+    lights: array<Light, 8>,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<uniform> params: Params;
+@group(0) @binding(2) var visible: texture_2d<u32>;
+@group(0) @binding(3) var shadows: texture_depth_2d_array;
+@group(0) @binding(4) var environment: texture_2d<f32>;
+@group(0) @binding(5) var trilinear_repeat: sampler;
+@group(0) @binding(6) var linear_clamp: sampler;
+@group(0) @binding(7) var compare: sampler_comparison;
+
+@group(1) @binding(0) var<storage, read> positions: array<vec4f>;
+@group(1) @binding(1) var<storage, read> vertices: array<Vertex>;
+@group(1) @binding(2) var<storage, read> triangles: array<vec4u>;
+@group(1) @binding(3) var<storage, read> frames: array<SurfaceFrame>;
+// r = cube root of melanin / 0.5, g = cube root of hemoglobin / 0.32, b = scattering strength, a = hair cover.
+@group(1) @binding(4) var skin_map: texture_2d<f32>;
+// r = specular intensity, g = roughness.
+@group(1) @binding(5) var gloss_map: texture_2d<f32>;
+// rg = slopes, b = variance lost in minification.
+@group(1) @binding(6) var slope_map: texture_2d<f32>;
+@group(1) @binding(7) var wrinkle_maps: texture_2d_array<f32>;
+@group(1) @binding(8) var blood: texture_2d<f32>;
+@group(1) @binding(9) var wrinkle_weights: texture_2d<f32>;
+@group(1) @binding(10) var skin_color: texture_2d<f32>;
+
+// Diffuse radiance of a white surface; a = scattering strength, 0 where nothing scatters.
+@group(2) @binding(0) var diffuse_out: texture_storage_2d<rgba16float, write>;
+// Linear albedo of what scatters.
+@group(2) @binding(1) var albedo_out: texture_storage_2d<rgba16float, write>;
+// Radiance that is not scattered: specular, and everything of eyes and teeth.
+@group(2) @binding(2) var direct_out: texture_storage_2d<rgba16float, write>;
+
+const MAX_MELANIN = 0.5;
+const MAX_HEMOGLOBIN = 0.32;
+
+// Numbers of rig's Material::ALL.
+const SKIN = 0u;
+const MUCOSA = 1u;
+const EYE = 2u;
+const TEETH = 3u;
+const GUMS = 4u;
+
+struct Surface {
+    position: vec3f,
+    // Of the triangle, towards the viewer.
+    facet: vec3f,
+    normal: vec3f,
+    // Normal without maps.
+    smooth_normal: vec3f,
+    albedo: vec3f,
+    occlusion: f32,
+    specular: f32,
+    // Beckmann m, already widened by variance.
+    roughness: f32,
+    scattering: f32,
+    f0: f32,
+    // Normal that diffuse light uses (differs from `normal` in the iris).
+    diffuse_normal: vec3f,
+}
+
+@compute @workgroup_size(8, 8)
+fn shade(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= view.size) {
+        return;
+    }
+    let seen = textureLoad(visible, id.xy, 0).x;
+    if seen == 0u {
+        if params.head == 0u {
+            textureStore(diffuse_out, id.xy, vec4f(0.0));
+            textureStore(albedo_out, id.xy, vec4f(0.0));
+            textureStore(direct_out, id.xy, vec4f(0.0));
+        }
+        return;
+    }
+    if (seen >> HEAD_SHIFT) != params.head {
+        return;
+    }
+    let pixel = vec2f(id.xy) + 0.5;
+    let corners = triangles[(seen & TRIANGLE_MASK) - 1u];
+    let surface = surface_at(pixel, corners);
+    let to_viewer = normalize(view.origin.xyz - surface.position);
+
+    var diffuse = ambient_diffuse(surface);
+    var specular = ambient_specular(surface, to_viewer);
+    let turn = 2.0 * PI * gradient_noise(vec2f(id.xy));
+    for (var i = 0u; i < view.light_count; i++) {
+        add_light(params.lights[i], surface, to_viewer, turn, &diffuse, &specular);
+    }
+
+    if surface.scattering > 0.0 {
+        textureStore(diffuse_out, id.xy, vec4f(diffuse, surface.scattering));
+        textureStore(albedo_out, id.xy, vec4f(surface.albedo, 1.0));
+        textureStore(direct_out, id.xy, vec4f(specular, 1.0));
+    } else {
+        textureStore(diffuse_out, id.xy, vec4f(0.0));
+        textureStore(albedo_out, id.xy, vec4f(0.0));
+        textureStore(direct_out, id.xy, vec4f(diffuse * surface.albedo + specular, 1.0));
+    }
+}
+
+// ---- Surface ----
+
+fn surface_at(pixel: vec2f, corners: vec4u) -> Surface {
+    let vertex = array<Vertex, 3>(vertices[corners.x], vertices[corners.y], vertices[corners.z]);
+    let a = positions[vertex[0].point].xyz - view.origin.xyz;
+    let b = positions[vertex[1].point].xyz - view.origin.xyz;
+    let c = positions[vertex[2].point].xyz - view.origin.xyz;
+    let here = ray_barycentrics(a, b, c, pixel_ray(view, pixel));
+    // The same triangle one pixel to the right and one down: texture gradients without neighbours.
+    let right = ray_barycentrics(a, b, c, pixel_ray(view, pixel + vec2f(1.0, 0.0)));
+    let down = ray_barycentrics(a, b, c, pixel_ray(view, pixel + vec2f(0.0, 1.0)));
+    let us = vec3f(vertex[0].u, vertex[1].u, vertex[2].u);
+    let vs = vec3f(vertex[0].v, vertex[1].v, vertex[2].v);
+    let uv = vec2f(dot(here, us), dot(here, vs));
+    let duv_dx = vec2f(dot(right, us), dot(right, vs)) - uv;
+    let duv_dy = vec2f(dot(down, us), dot(down, vs)) - uv;
+
+    let f0 = frames[corners.x];
+    let f1 = frames[corners.y];
+    let f2 = frames[corners.z];
+    var surface: Surface;
+    surface.position = view.origin.xyz + here.x * a + here.y * b + here.z * c;
+    let to_viewer = normalize(view.origin.xyz - surface.position);
+    let facet = cross(b - a, c - a);
+    let back = select(1.0, -1.0, dot(facet, to_viewer) < 0.0);
+    surface.facet = back * normalize(facet);
+    surface.smooth_normal = back * normalize(here.x * f0.normal + here.y * f1.normal + here.z * f2.normal);
+    surface.occlusion = clamp(here.x * f0.occlusion + here.y * f1.occlusion + here.z * f2.occlusion, 0.0, 1.0);
+    let along = here.x * f0.tangent + here.y * f1.tangent + here.z * f2.tangent;
+    let tangent = normalize(along - surface.smooth_normal * dot(along, surface.smooth_normal));
+    let bitangent = f0.bitangent_sign * cross(surface.smooth_normal, tangent) * back;
+
+    surface.normal = surface.smooth_normal;
+    surface.f0 = 0.028;
+    surface.scattering = 0.0;
+    switch corners.w {
+        case SKIN: { skin(&surface, uv, duv_dx, duv_dy, tangent, bitangent); }
+        case EYE: { eye(&surface, uv, duv_dx, duv_dy, tangent, bitangent, to_viewer); }
+        case TEETH: {
+            surface.albedo = vec3f(0.62, 0.55, 0.42);
+            surface.specular = 0.5;
+            surface.roughness = 0.25;
+            surface.f0 = 0.045;
+            surface.occlusion *= surface.occlusion;
+        }
+        case GUMS, MUCOSA: {
+            surface.albedo = vec3f(0.36, 0.11, 0.10);
+            surface.specular = 0.5;
+            surface.roughness = 0.28;
+            surface.occlusion *= surface.occlusion;
+        }
+        default: {
+            surface.albedo = vec3f(0.2);
+            surface.specular = 0.3;
+            surface.roughness = 0.5;
+        }
+    }
+    if corners.w != EYE {
+        surface.diffuse_normal = surface.normal;
+    }
+    return surface;
+}
+
+// Wrinkles: papers/004 section 8.2, slopes add up. Hemoglobin: section 7.4.2, written as the neutral value plus
+// changes so that neutral weights give the neutral map exactly. Colour: section 7.6.
+fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f, tangent: vec3f, bitangent: vec3f) {
+    (*surface).scattering = 1.0;
+    if params.has_maps == 0u {
+        (*surface).albedo = textureSampleLevel(skin_color, linear_clamp, vec2f(0.38, 0.52), 0.0).rgb;
+        (*surface).specular = 0.6;
+        (*surface).roughness = 0.32;
+        return;
+    }
+    let map = textureSampleGrad(skin_map, trilinear_repeat, uv, duv_dx, duv_dy);
+    let fine = textureSampleGrad(slope_map, trilinear_repeat, uv, duv_dx, duv_dy);
+    var slopes = params.slope_scale * fine.xy;
+    let weights = textureSampleLevel(wrinkle_weights, linear_clamp, uv, 0.0);
+    for (var i = 0u; i < params.wrinkle_map_count; i++) {
+        if weights[i] > 0.0 {
+            slopes += params.wrinkle_strength * weights[i]
+                * textureSampleGrad(wrinkle_maps, trilinear_repeat, uv, i, duv_dx, duv_dy).xy;
+        }
+    }
+    (*surface).normal =
+        normalize((*surface).smooth_normal + slopes.x * tangent + slopes.y * bitangent);
+
+    let change = textureSampleLevel(blood, linear_clamp, uv, 0.0);
+    let neutral = MAX_HEMOGLOBIN * map.g * map.g * map.g;
+    var hemoglobin = neutral + change.x + change.y * (neutral - change.z);
+    hemoglobin = clamp(params.hemoglobin_scale * hemoglobin, 0.0, MAX_HEMOGLOBIN);
+    let axes = vec2f(map.r, pow(hemoglobin / MAX_HEMOGLOBIN, 1.0 / 3.0));
+    let table = vec2f(textureDimensions(skin_color));
+    (*surface).albedo =
+        textureSampleLevel(skin_color, linear_clamp, (axes * (table - 1.0) + 0.5) / table, 0.0).rgb;
+
+    (*surface).albedo = mix((*surface).albedo, params.hair_color.rgb, map.a);
+
+    let gloss = textureSampleGrad(gloss_map, trilinear_repeat, uv, duv_dx, duv_dy);
+    (*surface).specular = gloss.r;
+    // Slope variance that the mip level hides is roughness (Toksvig 2005; for Beckmann m^2 = 2 sigma^2).
+    let variance = square(params.slope_scale) * fine.z;
+    (*surface).roughness = sqrt(min(square(gloss.g) + 2.0 * variance, 0.64));
+    (*surface).scattering = map.b;
+}
+
+// The azimuthal coordinates of Material::Eye. Angles in radians.
+const IRIS_ANGLE = 0.50;
+const PUPIL_ANGLE = 0.17;
+const EYE_RADIUS_MM = 12.0;
+const IRIS_DEPTH_MM = 2.2;
+
+fn eye(
+    surface: ptr<function, Surface>,
+    uv: vec2f,
+    duv_dx: vec2f,
+    duv_dy: vec2f,
+    tangent: vec3f,
+    bitangent: vec3f,
+    to_viewer: vec3f,
+) {
+    let from_axis = uv - 0.5;
+    let theta = 2.0 * PI * length(from_axis);
+    (*surface).specular = 1.0;
+    (*surface).f0 = 0.025;
+    (*surface).roughness = mix(0.06, 0.16, smoothstep(IRIS_ANGLE, IRIS_ANGLE + 0.15, theta));
+
+    // Looking through the cornea: the refracted ray meets the iris plane off to the side.
+    let normal = (*surface).smooth_normal;
+    let refracted = refract(-to_viewer, normal, 1.0 / 1.336);
+    let sideways = vec2f(dot(refracted, tangent), -dot(refracted, bitangent)) / max(-dot(refracted, normal), 0.2);
+    let inside = smoothstep(IRIS_ANGLE + 0.04, IRIS_ANGLE - 0.1, theta);
+    let shifted = from_axis + inside * sideways * IRIS_DEPTH_MM / (2.0 * PI * EYE_RADIUS_MM);
+    let radius = 2.0 * PI * length(shifted);
+    let around = atan2(shifted.y, shifted.x);
+    // Width of a pixel in the same angle, for soft borders.
+    let pixel = clamp(2.0 * PI * max(length(duv_dx), length(duv_dy)), 0.005, 0.2);
+
+    // Iris: a collarette, radial fibres, a dark limbus.
+    let r = clamp((radius - PUPIL_ANGLE) / (IRIS_ANGLE - PUPIL_ANGLE), 0.0, 1.0);
+    let fibres = 0.5 + 0.28 * sin(around * 61.0 + 3.0 * sin(r * 7.0)) * sin(around * 23.0 + r * 5.0)
+        + 0.22 * sin(around * 113.0 + r * 9.0);
+    let fade = clamp(0.06 / pixel, 0.0, 1.0);
+    let texture = mix(0.5, fibres, fade);
+    var iris = mix(vec3f(0.17, 0.085, 0.035), vec3f(0.075, 0.10, 0.085), smoothstep(0.15, 0.75, r));
+    iris *= 0.55 + 0.9 * texture;
+    iris *= 1.0 - 0.75 * smoothstep(0.72, 1.0, r);
+    let pupil = smoothstep(PUPIL_ANGLE - pixel, PUPIL_ANGLE + pixel, radius);
+    iris *= pupil;
+
+    // Sclera: never white; veins and blood towards the corners.
+    let blush = smoothstep(0.7, 1.5, theta);
+    let sclera = mix(vec3f(0.56, 0.52, 0.48), vec3f(0.50, 0.32, 0.27), blush);
+    let limbus = smoothstep(IRIS_ANGLE - 0.05 - pixel, IRIS_ANGLE + 0.05 + pixel, radius);
+    (*surface).albedo = mix(iris, sclera, limbus);
+
+    // The iris is a shallow bowl: it is lit as if it faced the middle.
+    let outward_uv = select(vec2f(0.0), from_axis / length(from_axis), length(from_axis) > 1e-5);
+    let outward = outward_uv.x * tangent - outward_uv.y * bitangent;
+    let axis = normalize(normal * cos(theta) - outward * sin(theta));
+    let bowl = normalize(axis - 0.35 * r * outward);
+    (*surface).diffuse_normal = normalize(mix(bowl, normal, limbus));
+    // Lids shade the eye more than the rest pose says.
+    (*surface).occlusion = (*surface).occlusion * (*surface).occlusion;
+}
+
+// ---- Light ----
+
+// Beckmann distribution over half vectors, 1 / steradian.
+fn beckmann(cos_half: f32, m: f32) -> f32 {
+    let c2 = max(cos_half * cos_half, 1e-4);
+    let m2 = m * m;
+    return exp((c2 - 1.0) / (c2 * m2)) / (PI * m2 * c2 * c2);
+}
+
+fn schlick(f0: f32, cosine: f32) -> f32 { return f0 + (1.0 - f0) * pow5(1.0 - clamp(cosine, 0.0, 1.0)); }
+
+fn add_light(
+    light: Light,
+    surface: Surface,
+    to_viewer: vec3f,
+    turn: f32,
+    diffuse: ptr<function, vec3f>,
+    specular: ptr<function, vec3f>,
+) {
+    var to_light = light.position.xyz;
+    var falloff = 1.0;
+    var spread = light.color.w;
+    if light.position.w > 0.0 {
+        to_light -= surface.position;
+        let distance_squared = max(dot(to_light, to_light), 1e-4);
+        falloff = 1.0 / distance_squared;
+        spread *= inverseSqrt(distance_squared);
+        to_light = normalize(to_light);
+        if light.spot.w > -1.5 {
+            let cone = smoothstep(light.spot.w, light.shape.x, -dot(to_light, light.spot.xyz));
+            falloff *= cone;
+        }
+    }
+    let facing = dot(surface.smooth_normal, to_light);
+    if falloff <= 0.0 || facing <= -0.2 {
+        return;
+    }
+    var irradiance = falloff * light.color.rgb;
+    if light.shape.y >= 0.0 {
+        irradiance *= shadow(light, surface, to_light, turn);
+    }
+    // A bump cannot see a light that its surface does not face.
+    let horizon = smoothstep(-0.05, 0.10, facing);
+    let cos_diffuse = max(dot(surface.diffuse_normal, to_light), 0.0) * horizon;
+    *diffuse += irradiance * cos_diffuse / PI;
+
+    // Kelemen and Szirmay-Kalos 2001: the geometry term is 1 / |L + V|^2 (papers/002, papers/004).
+    let cos_light = max(dot(surface.normal, to_light), 0.0) * horizon;
+    if cos_light > 0.0 {
+        let half_vector = to_light + to_viewer;
+        let h = normalize(half_vector);
+        // A large source widens the highlight.
+        let m = sqrt(square(surface.roughness) + 0.25 * square(spread));
+        let brdf = beckmann(dot(surface.normal, h), m) * schlick(surface.f0, dot(h, to_viewer))
+            / max(dot(half_vector, half_vector), 0.05);
+        *specular += irradiance * surface.specular * brdf * cos_light;
+    }
+}
+
+const BLOCKER_SAMPLES = 10u;
+const FILTER_SAMPLES = 16u;
+
+// Percentage-closer soft shadows (Fernando 2005): the mean depth of blockers sets the width of the filter.
+fn shadow(light: Light, surface: Surface, to_light: vec3f, turn: f32) -> f32 {
+    let near = light.shape.z;
+    let far = light.shape.w;
+    let resolution = f32(textureDimensions(shadows).x);
+    var across = light.shadow.x;
+    if light.position.w > 0.0 {
+        across *= dot(light.position.xyz - surface.position, to_light);
+    }
+    let texel = across / resolution;
+    // Move off the surface by what a filter tap can see of it: more where the light grazes.
+    let facing = clamp(dot(surface.facet, to_light), 0.05, 1.0);
+    let lift = texel * (0.6 + 1.8 * sqrt(1.0 - facing * facing)) * sign(dot(surface.facet, surface.smooth_normal));
+    let p = surface.position + surface.facet * lift + to_light * texel;
+    let clip = light.clip_from_world * vec4f(p, 1.0);
+    let ndc = clip.xyz / clip.w;
+    if any(abs(ndc.xy) > vec2f(1.0)) || ndc.z > 1.0 || clip.w <= 0.0 {
+        return 1.0;
+    }
+    let center = ndc.xy * vec2f(0.5, -0.5) + 0.5;
+    let layer = i32(light.shape.y);
+    let receiver = shadow_metres(light, ndc.z);
+
+    // Search as far as the source could reach over a typical gap of 5 cm.
+    let reach = clamp(light.color.w * select(1.0, 1.0 / receiver, light.position.w > 0.0) * 0.05 / across, 2.0 / resolution, 0.06);
+    var blocked = 0.0;
+    var blocker = 0.0;
+    for (var i = 0u; i < BLOCKER_SAMPLES; i++) {
+        let at = center + reach * vogel_disk(i, BLOCKER_SAMPLES, turn);
+        let texel_at = vec2i(clamp(at, vec2f(0.0), vec2f(0.9999)) * resolution);
+        let d = shadow_metres(light, textureLoad(shadows, texel_at, layer, 0));
+        if d < receiver - texel {
+            blocked += 1.0;
+            blocker += d;
+        }
+    }
+    if blocked == 0.0 {
+        return 1.0;
+    }
+    blocker /= blocked;
+    var penumbra = (receiver - blocker) * light.color.w;
+    if light.position.w > 0.0 {
+        penumbra /= blocker;
+    }
+    let width = clamp(penumbra / across, 1.2 / resolution, 0.05);
+    // Wider filters see more of their own slope.
+    let bias = (width * across * 0.6 * sqrt(1.0 - facing * facing) / facing) * 0.5;
+    let reference = shadow_depth(light, max(receiver - bias, near));
+    var lit = 0.0;
+    for (var i = 0u; i < FILTER_SAMPLES; i++) {
+        let at = center + width * vogel_disk(i, FILTER_SAMPLES, turn);
+        lit += textureSampleCompareLevel(shadows, compare, at, layer, reference);
+    }
+    return lit / f32(FILTER_SAMPLES);
+}
+
+// Distance from the light along its axis, metres, of a depth of the shadow map.
+fn shadow_metres(light: Light, depth: f32) -> f32 {
+    let near = light.shape.z;
+    let far = light.shape.w;
+    if light.position.w > 0.0 {
+        return near * far / (far - depth * (far - near));
+    }
+    return near + depth * (far - near);
+}
+
+fn shadow_depth(light: Light, metres: f32) -> f32 {
+    let near = light.shape.z;
+    let far = light.shape.w;
+    if light.position.w > 0.0 {
+        return (far - near * far / metres) / (far - near);
+    }
+    return (metres - near) / (far - near);
+}
+
+// Irradiance / pi from spherical harmonics (Ramamoorthi and Hanrahan 2001); the convolution is in the coefficients.
+fn harmonic_irradiance(n: vec3f) -> vec3f {
+    let h = params.harmonics;
+    let sum = h[0].rgb
+        + h[1].rgb * n.y + h[2].rgb * n.z + h[3].rgb * n.x
+        + h[4].rgb * (n.x * n.y) + h[5].rgb * (n.y * n.z) + h[6].rgb * (3.0 * n.z * n.z - 1.0)
+        + h[7].rgb * (n.x * n.z) + h[8].rgb * (n.x * n.x - n.y * n.y);
+    return max(sum, vec3f(0.0));
+}
+
+fn ambient_diffuse(surface: Surface) -> vec3f {
+    if view.has_environment == 0u {
+        return vec3f(0.0);
+    }
+    // Light that bounces inside a cavity takes its colour (Jimenez et al. 2016, "Practical real-time strategies for
+    // accurate indirect occlusion", fit of multiple bounces).
+    let a = surface.albedo;
+    let v = surface.occlusion;
+    let bounced = max(
+        vec3f(v),
+        ((v * (2.0404 * a - 0.3324) + (-4.7951 * a + 0.6417)) * v + (2.7552 * a + 0.6903)) * v,
+    );
+    return params.environment_intensity * bounced * harmonic_irradiance(surface.diffuse_normal);
+}
+
+fn ambient_specular(surface: Surface, to_viewer: vec3f) -> vec3f {
+    if view.has_environment == 0u {
+        return vec3f(0.0);
+    }
+    let n = surface.normal;
+    let cosine = clamp(dot(n, to_viewer), 0.0, 1.0);
+    let r = reflect(-to_viewer, n);
+    // Level i of the map is filtered for roughness i / (levels - 1).
+    let level = sqrt(surface.roughness) * (params.environment_levels - 1.0);
+    let uv = vec2f(atan2(r.x, -r.z) / (2.0 * PI) + 0.5, acos(clamp(r.y, -1.0, 1.0)) / PI);
+    let radiance = textureSampleLevel(environment, trilinear_repeat, uv, level).rgb;
+    // Rough surfaces never reach the full grazing reflectance (Lagarde 2014).
+    let fresnel = surface.f0 + (max(1.0 - surface.roughness, surface.f0) - surface.f0) * pow5(1.0 - cosine);
+    // A cavity hides what the reflection would show (Lagarde and de Rousiers 2014, eq. 67).
+    let hidden = clamp(pow(cosine + surface.occlusion, exp2(-16.0 * surface.roughness - 1.0)) - 1.0 + surface.occlusion, 0.0, 1.0);
+    return params.environment_intensity * surface.specular * fresnel * hidden * radiance;
+}

@@ -1,0 +1,159 @@
+//! Depth of the heads from each light.
+//!
+//! ```text
+//! positions, light --shadow--> depth layer (0 near, 1 far)
+//! ```
+//!
+//! Theory: shadow maps (Williams 1978), fitted to the sphere around the heads of the frame, so that a close-up has
+//! the resolution of the head and not of the room. All triangles are drawn, front and back: a mouth or a nostril must
+//! block light from either side. The soft edge is in `shade` (percentage-closer soft shadows).
+
+use glam::camera::rh::{proj, view};
+use glam::{Mat4, Vec3};
+
+use crate::gpu::{Gpu, PassTimer};
+use crate::head::HeadOnGpu;
+use crate::scene::LightKind;
+
+/// WGSL of the pass.
+pub(crate) const SHADER: &str = concat!(
+    include_str!("../../shared/view.wgsl"),
+    include_str!("../../shared/surface.wgsl"),
+    include_str!("shadow.wgsl")
+);
+
+/// A light's view of the heads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightView {
+    pub(crate) clip_from_world: Mat4,
+    /// Metres from the light (or from the plane before the sphere) to the near and far end of the depth range.
+    pub(crate) near: f32,
+    pub(crate) far: f32,
+    /// Metres across the map, at 1 m for lights with a place.
+    pub(crate) across: f32,
+}
+
+impl LightView {
+    /// Fits a view to a sphere (metres).
+    pub(crate) fn fit(kind: &LightKind, center: Vec3, radius: f32) -> Self {
+        let (direction, distance) = match *kind {
+            LightKind::Directional { direction } => (direction.normalize_or(Vec3::NEG_Z), None),
+            LightKind::Spot { position, .. } | LightKind::Point { position } => {
+                let way = center - position;
+                (way.normalize_or(Vec3::NEG_Z), Some((position, way.length().max(1.05 * radius))))
+            }
+        };
+        let up = if direction.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
+        match distance {
+            None => {
+                let (near, far) = (0.0, 2.0 * radius);
+                let eye = center - direction * radius;
+                let projection = proj::directx::orthographic(-radius, radius, -radius, radius, near, far);
+                let view = view::look_to_mat4(eye, direction, up);
+                Self { clip_from_world: projection * view, near, far, across: 2.0 * radius }
+            }
+            Some((eye, distance)) => {
+                let (near, far) = (distance - radius, distance + radius);
+                let tangent = (radius / distance).asin().tan();
+                let projection = proj::directx::perspective(2.0 * tangent.atan(), 1.0, near, far);
+                let view = view::look_to_mat4(eye, direction, up);
+                Self { clip_from_world: projection * view, near, far, across: 2.0 * tangent }
+            }
+        }
+    }
+}
+
+/// The pipeline of the pass.
+pub(crate) struct Shadow {
+    pipeline: wgpu::RenderPipeline,
+}
+
+impl Shadow {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let module = gpu.shader("shadow", SHADER);
+        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("shadow"),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("shadow_vertex"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: wgpu::TextureFormat::Depth32Float,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Less),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: None,
+            multiview_mask: None,
+            cache: None,
+        });
+        Self { pipeline }
+    }
+
+    /// Draws the opaque triangles of all heads into a layer.
+    pub(crate) fn record(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        timer: &mut PassTimer,
+        light: &LightView,
+        heads: &[(&HeadOnGpu, &wgpu::Buffer)],
+        layer: &wgpu::TextureView,
+    ) {
+        let clip_from_world = gpu.uniform("shadow", &light.clip_from_world);
+        let depth = wgpu::RenderPassDepthStencilAttachment {
+            view: layer,
+            depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store: wgpu::StoreOp::Store }),
+            stencil_ops: None,
+        };
+        let mut pass = timer.render(encoder, "shadow", &[], Some(depth));
+        pass.set_pipeline(&self.pipeline);
+        for (head, positions) in heads {
+            let group = gpu.bind_layout(
+                "shadow",
+                &self.pipeline.get_bind_group_layout(0),
+                &[
+                    clip_from_world.as_entire_binding(),
+                    positions.as_entire_binding(),
+                    head.vertices.as_entire_binding(),
+                    head.triangles.as_entire_binding(),
+                ],
+            );
+            pass.set_bind_group(0, &group, &[]);
+            pass.draw(0..head.opaque_triangles * 3, 0..1);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sphere_fits_the_map() {
+        let center = Vec3::new(0.1, 1.5, -0.2);
+        let kinds = [
+            LightKind::Directional { direction: Vec3::new(0.3, -1.0, -0.2) },
+            LightKind::Point { position: Vec3::new(0.5, 2.0, 1.0) },
+        ];
+        for kind in kinds {
+            let view = LightView::fit(&kind, center, 0.15);
+            for offset in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
+                let p = view.clip_from_world.project_point3(center + 0.149 * offset);
+                assert!(p.x.abs() <= 1.0 && p.y.abs() <= 1.0 && (0.0..=1.0).contains(&p.z), "{kind:?} {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_light_inside_the_head_does_not_divide_by_zero() {
+        let kind = LightKind::Point { position: Vec3::ZERO };
+        assert!(LightView::fit(&kind, Vec3::ZERO, 0.15).clip_from_world.is_finite());
+    }
+}

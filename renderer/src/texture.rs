@@ -1,0 +1,127 @@
+//! Textures with mip levels from arrays.
+
+use half::f16;
+use rayon::prelude::*;
+
+use crate::gpu::Gpu;
+
+/// A texel that can be averaged.
+pub(crate) type Texel = [f32; 4];
+
+/// Mip levels of an image by 2 x 2 averages, the image itself first. Odd sizes repeat their last row or column.
+pub(crate) fn mip_chain(size: [u32; 2], texels: Vec<Texel>) -> Vec<Vec<Texel>> {
+    let mut chain = vec![texels];
+    let mut from = size;
+    while from != [1, 1] {
+        let to = from.map(|n| (n / 2).max(1));
+        let last = &chain[chain.len() - 1];
+        let next = (0..(to[0] * to[1]) as usize)
+            .into_par_iter()
+            .with_min_len(4096)
+            .map(|i| {
+                let (x, y) = (i as u32 % to[0] * 2, i as u32 / to[0] * 2);
+                let at = |x: u32, y: u32| last[(y.min(from[1] - 1) * from[0] + x.min(from[0] - 1)) as usize];
+                let corners = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
+                std::array::from_fn(|c| corners.iter().map(|t| t[c]).sum::<f32>() * 0.25)
+            })
+            .collect();
+        chain.push(next);
+        from = to;
+    }
+    chain
+}
+
+/// A texture array of 16-bit floats; `layers[layer][level][texel]`.
+pub(crate) fn upload_half(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 2],
+    layers: &[Vec<Vec<Texel>>],
+) -> wgpu::TextureView {
+    upload(gpu, label, size, layers, wgpu::TextureFormat::Rgba16Float, &|texels| {
+        texels.par_iter().with_min_len(4096).flat_map_iter(|t| t.map(f16::from_f32)).collect::<Vec<_>>()
+    })
+}
+
+/// A texture array of 8-bit values 0 to 1; `layers[layer][level][texel]`.
+pub(crate) fn upload_bytes(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 2],
+    layers: &[Vec<Vec<Texel>>],
+) -> wgpu::TextureView {
+    upload(gpu, label, size, layers, wgpu::TextureFormat::Rgba8Unorm, &|texels| {
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+        texels.par_iter().with_min_len(4096).flat_map_iter(|t| t.map(byte)).collect::<Vec<_>>()
+    })
+}
+
+fn upload<T: bytemuck::Pod>(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 2],
+    layers: &[Vec<Vec<Texel>>],
+    format: wgpu::TextureFormat,
+    encode: &dyn Fn(&[Texel]) -> Vec<T>,
+) -> wgpu::TextureView {
+    let levels = layers.first().map_or(1, Vec::len) as u32;
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: layers.len() as u32 },
+        mip_level_count: levels,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let texel_bytes = 4 * size_of::<T>() as u32;
+    for (layer, chain) in layers.iter().enumerate() {
+        for (level, texels) in chain.iter().enumerate() {
+            let width = (size[0] >> level).max(1);
+            let height = (size[1] >> level).max(1);
+            gpu.queue.write_texture(
+                wgpu::TexelCopyTextureInfo {
+                    texture: &texture,
+                    mip_level: level as u32,
+                    origin: wgpu::Origin3d { x: 0, y: 0, z: layer as u32 },
+                    aspect: wgpu::TextureAspect::All,
+                },
+                bytemuck::cast_slice(&encode(texels)),
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(width * texel_bytes),
+                    rows_per_image: None,
+                },
+                wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            );
+        }
+    }
+    texture.create_view(&Default::default())
+}
+
+/// The same texture seen as an array, whatever its number of layers.
+pub(crate) fn array_view(view: &wgpu::TextureView) -> wgpu::TextureView {
+    view.texture().create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mips_end_in_the_mean() {
+        let texels = (0..8).map(|i| [i as f32; 4]).collect();
+        let chain = mip_chain([4, 2], texels);
+        assert_eq!(chain.iter().map(Vec::len).collect::<Vec<_>>(), [8, 2, 1]);
+        assert_eq!(chain[2][0], [3.5; 4]);
+    }
+
+    #[test]
+    fn odd_sizes_work() {
+        assert_eq!(mip_chain([5, 3], vec![[1.0; 4]; 15]).last(), Some(&vec![[1.0; 4]]));
+    }
+}

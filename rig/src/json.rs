@@ -1,0 +1,492 @@
+//! Reading JSON as people write it, with the place of everything that is wrong.
+//!
+//! ```text
+//! text --parse--> tree with ranges --serde--> Rig, Sequence  (+ Source: text and file name)
+//!                        \--> an error inside a value: the range of that value
+//! Source + path of a value --parse again--> line, column     (only when a message is needed)
+//! ```
+//!
+//! Allowed beyond JSON: `//` and `/* */` comments, trailing commas. Not allowed, unlike in some readers: the same key
+//! twice, as the first would be silently lost.
+
+use std::fmt::Display;
+use std::sync::Arc;
+
+use jsonc_parser::ast::{ObjectPropName, Value};
+use jsonc_parser::common::Ranged;
+use jsonc_parser::errors::ParseErrorKind;
+use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
+use serde::de::value::StrDeserializer;
+use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, Visitor};
+use serde::forward_to_deserialize_any;
+
+use crate::error::{Place, RigError};
+use crate::names::nearest;
+
+/// Where a value was read from, kept with it so that a later message can name the place.
+/// All sources are equal to each other: two rigs are the same rig whatever file they stand in.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    file: Arc<str>,
+    text: Arc<str>,
+}
+
+impl PartialEq for Source {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// One step from a JSON value into it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// The member of an object.
+    Key(String),
+    /// The element of an array, from 0.
+    Index(usize),
+}
+
+impl From<&str> for Step {
+    fn from(key: &str) -> Self {
+        Self::Key(key.to_owned())
+    }
+}
+
+impl From<&String> for Step {
+    fn from(key: &String) -> Self {
+        Self::Key(key.clone())
+    }
+}
+
+impl From<usize> for Step {
+    fn from(index: usize) -> Self {
+        Self::Index(index)
+    }
+}
+
+/// Steps from the whole document to one value: `steps!["expressions", name, "shapes"]`.
+macro_rules! steps {
+    ($($step:expr),* $(,)?) => { [$($crate::json::Step::from($step)),*] };
+}
+pub(crate) use steps;
+
+impl Source {
+    /// Text of a file under the name that messages give it.
+    pub fn new(file: &str, text: &str) -> Self {
+        Self { file: file.into(), text: text.into() }
+    }
+
+    /// Name of the file as messages give it; empty for values that were made by a program.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Place of a value, or of the last value on the way that exists.
+    pub fn place_of_value(&self, path: &[Step]) -> Place {
+        self.place(path, false)
+    }
+
+    /// Place of the key that leads to a value.
+    pub fn place_of_key(&self, path: &[Step]) -> Place {
+        self.place(path, true)
+    }
+
+    fn place(&self, path: &[Step], at_key: bool) -> Place {
+        let nowhere = || Place { file: self.file.to_string(), line: 0, column: 0 };
+        let Ok(Some(root)) = parse(&self.text) else { return nowhere() };
+        let mut value = &root;
+        let mut start = value.range().start;
+        for (depth, step) in path.iter().enumerate() {
+            let next = match (step, value) {
+                (Step::Key(key), Value::Object(object)) => object
+                    .properties
+                    .iter()
+                    .find(|p| p.name.as_str() == key)
+                    .map(|p| (&p.value, p.name.range().start)),
+                (Step::Index(index), Value::Array(array)) => {
+                    array.elements.get(*index).map(|element| (element, element.range().start))
+                }
+                _ => None,
+            };
+            let Some((inner, key_start)) = next else { break };
+            value = inner;
+            start = if at_key && depth + 1 == path.len() { key_start } else { inner.range().start };
+        }
+        place_of_offset(&self.file, &self.text, start)
+    }
+}
+
+/// Reads a value.
+///
+/// # Errors
+/// Syntax, unknown fields, wrong types: the first of them with its place.
+pub fn from_str<T: DeserializeOwned>(file: &str, text: &str) -> Result<(T, Source), RigError> {
+    // A byte order mark is no part of the text for the one who wrote it.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let root = match parse(text) {
+        Ok(Some(root)) => root,
+        Ok(None) => {
+            return Err(RigError {
+                place: place_of_offset(file, text, text.len()),
+                found: "no value".into(),
+                expected: "an object".into(),
+                nearest: None,
+            });
+        }
+        Err(error) => return Err(syntax_error(file, text, &error)),
+    };
+    match T::deserialize(Node(&root)) {
+        Ok(value) => Ok((value, Source::new(file, text))),
+        Err(error) => Err(RigError {
+            place: place_of_offset(file, text, error.offset.unwrap_or_default()),
+            found: error.found,
+            expected: error.expected,
+            nearest: error.nearest,
+        }),
+    }
+}
+
+/// Reads the text of a file.
+///
+/// # Errors
+/// A file that cannot be read, or that is not UTF-8.
+pub fn read_text(path: &std::path::Path) -> Result<String, RigError> {
+    std::fs::read_to_string(path).map_err(|error| RigError {
+        place: Place { file: path.display().to_string(), line: 0, column: 0 },
+        found: error.to_string(),
+        expected: "a readable text file".into(),
+        nearest: None,
+    })
+}
+
+fn parse(text: &str) -> Result<Option<Value<'_>>, jsonc_parser::errors::ParseError> {
+    let options = ParseOptions {
+        allow_comments: true,
+        allow_trailing_commas: true,
+        allow_loose_object_property_names: false,
+        allow_missing_commas: false,
+        allow_single_quoted_strings: false,
+        allow_hexadecimal_numbers: false,
+        allow_unary_plus_numbers: false,
+        allow_bare_decimal_point_numbers: false,
+        allow_non_finite_numbers: false,
+        allow_extended_string_escapes: false,
+    };
+    Ok(parse_to_ast(text, &CollectOptions::default(), &options)?.value)
+}
+
+fn place_of_offset(file: &str, text: &str, offset: usize) -> Place {
+    let before = text.get(..offset).unwrap_or(text);
+    let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+    Place {
+        file: file.to_owned(),
+        line: before.matches('\n').count() + 1,
+        column: before[line_start..].chars().count() + 1,
+    }
+}
+
+fn syntax_error(file: &str, text: &str, error: &jsonc_parser::errors::ParseError) -> RigError {
+    use ParseErrorKind as Kind;
+    let range = error.range();
+    let expected = match error.kind() {
+        Kind::ExpectedColonAfterObjectKey => "a colon after the name",
+        Kind::ExpectedComma => "a comma",
+        Kind::ExpectedObjectValue => "a value after the colon",
+        Kind::ExpectedStringObjectProperty | Kind::UnexpectedTokenInObject => "a name in double quotes",
+        Kind::UnexpectedWord => "a value: a number, a string in double quotes, an object or an array",
+        Kind::SingleQuotedStringsNotAllowed => "double quotes",
+        Kind::MultipleRootJsonValues => "the end of the file",
+        Kind::NonFiniteNumbersNotAllowed => "a finite number",
+        Kind::UnterminatedArray => "a closing ]",
+        Kind::UnterminatedObject => "a closing }",
+        Kind::UnterminatedCommentBlock => "a closing */",
+        Kind::NestingDepthExceeded => "less nesting",
+        Kind::BareDecimalPointNumbersNotAllowed
+        | Kind::ExpectedDigit
+        | Kind::ExpectedDigitFollowingNegativeSign
+        | Kind::ExpectedPlusMinusOrDigitInNumberLiteral
+        | Kind::HexadecimalNumbersNotAllowed
+        | Kind::UnaryPlusNumbersNotAllowed => "a decimal number such as -0.5",
+        Kind::String(_) => "a string that ends in a double quote and has no unknown escapes",
+        Kind::UnexpectedCloseBrace | Kind::UnexpectedCloseBracket => {
+            "a value, or the bracket that closes what is open"
+        }
+        Kind::UnexpectedColon
+        | Kind::UnexpectedComma
+        | Kind::UnexpectedToken
+        | Kind::TrailingCommasNotAllowed
+        | Kind::CommentsNotAllowed => "a value",
+    };
+    RigError {
+        place: place_of_offset(file, text, range.start),
+        found: match error.kind() {
+            // Their place is the beginning, which is easier to find the mistake from than the end of the file.
+            Kind::UnterminatedArray | Kind::UnterminatedObject => {
+                "an opening bracket without its end".to_owned()
+            }
+            _ => excerpt(text, range.start),
+        },
+        expected: expected.to_owned(),
+        nearest: None,
+    }
+}
+
+/// The beginning of what stands at an offset, for a message.
+fn excerpt(text: &str, offset: usize) -> String {
+    const LONGEST: usize = 24;
+    let rest = text.get(offset..).unwrap_or_default();
+    let line = rest.lines().next().unwrap_or_default().trim();
+    if rest.is_empty() {
+        "the end of the file".to_owned()
+    } else if line.is_empty() {
+        "the end of the line".to_owned()
+    } else if line.chars().count() > LONGEST {
+        format!("`{}...`", line.chars().take(LONGEST).collect::<String>())
+    } else {
+        format!("`{line}`")
+    }
+}
+
+/// What serde finds wrong, before it has a file and a line.
+#[derive(Debug)]
+struct NodeError {
+    offset: Option<usize>,
+    found: String,
+    expected: String,
+    nearest: Option<String>,
+}
+
+impl NodeError {
+    fn new(found: String, expected: String) -> Self {
+        Self { offset: None, found, expected, nearest: None }
+    }
+
+    /// The innermost value gives the place; an error that has one keeps it.
+    fn at(mut self, node: &Value<'_>) -> Self {
+        if self.offset.is_none() {
+            self.offset = Some(node.range().start);
+            if self.found.is_empty() {
+                self.found = describe(node);
+            }
+        }
+        self
+    }
+
+    fn unknown(kind: &str, found: &str, valid: &'static [&'static str]) -> Self {
+        let nearest = nearest(found, valid.iter().copied());
+        let expected = match valid {
+            [] => format!("no {kind} here"),
+            [only] => format!("the {kind} {only:?}"),
+            _ => format!("one of the {kind}s {}", quoted_list(valid.iter().copied())),
+        };
+        Self { offset: None, found: format!("the unknown {kind} {found:?}"), expected, nearest }
+    }
+}
+
+/// `"a", "b", "c"`.
+pub(crate) fn quoted_list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    names.into_iter().map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ")
+}
+
+impl Display for NodeError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "found {}, expected {}", self.found, self.expected)
+    }
+}
+
+impl std::error::Error for NodeError {}
+
+/// Rust's words for types in those of the one who writes JSON.
+fn in_json_words(expected: &dyn de::Expected) -> String {
+    match expected.to_string().as_str() {
+        "f32" | "f64" => "a number".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more".to_owned(),
+        "a map" => "an object".to_owned(),
+        "a sequence" => "an array".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        words if words.starts_with("struct ") => "an object".to_owned(),
+        words if words.starts_with("variant identifier") || words.starts_with("enum ") => {
+            "a string".to_owned()
+        }
+        words => words.to_owned(),
+    }
+}
+
+impl de::Error for NodeError {
+    fn custom<M: Display>(message: M) -> Self {
+        Self::new(String::new(), message.to_string())
+    }
+
+    fn invalid_type(_: de::Unexpected<'_>, expected: &dyn de::Expected) -> Self {
+        Self::new(String::new(), in_json_words(expected))
+    }
+
+    fn invalid_value(_: de::Unexpected<'_>, expected: &dyn de::Expected) -> Self {
+        Self::new(String::new(), in_json_words(expected))
+    }
+
+    fn invalid_length(length: usize, expected: &dyn de::Expected) -> Self {
+        Self::new(format!("{length} elements"), in_json_words(expected))
+    }
+
+    fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
+        Self::unknown("field", field, expected)
+    }
+
+    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
+        Self::unknown("name", variant, expected)
+    }
+
+    fn missing_field(field: &'static str) -> Self {
+        Self::new(format!("an object without {field:?}"), format!("the field {field:?}"))
+    }
+}
+
+fn describe(node: &Value<'_>) -> String {
+    match node {
+        Value::StringLit(s) if s.value.chars().count() > 40 => {
+            format!("the string {:?}...", s.value.chars().take(40).collect::<String>())
+        }
+        Value::StringLit(s) => format!("the string {:?}", s.value),
+        Value::NumberLit(n) => format!("the number {}", n.value),
+        Value::BooleanLit(b) => b.value.to_string(),
+        Value::Object(_) => "an object".to_owned(),
+        Value::Array(a) => format!("an array of {}", a.elements.len()),
+        Value::NullKeyword(_) => "null".to_owned(),
+    }
+}
+
+/// serde's view of a tree node.
+struct Node<'a>(&'a Value<'a>);
+
+impl Node<'_> {
+    fn visit<'de, V: Visitor<'de>>(&self, visitor: V) -> Result<V::Value, NodeError> {
+        match self.0 {
+            Value::StringLit(s) => visitor.visit_str(&s.value),
+            Value::BooleanLit(b) => visitor.visit_bool(b.value),
+            Value::NullKeyword(_) => visitor.visit_unit(),
+            Value::NumberLit(n) => {
+                if let Ok(whole) = n.value.parse::<u64>() {
+                    visitor.visit_u64(whole)
+                } else if let Ok(whole) = n.value.parse::<i64>() {
+                    visitor.visit_i64(whole)
+                } else {
+                    match n.value.parse::<f64>() {
+                        Ok(number) if number.is_finite() => visitor.visit_f64(number),
+                        _ => Err(NodeError::new(String::new(), "a finite number".to_owned())),
+                    }
+                }
+            }
+            Value::Array(array) => {
+                let mut elements = Elements(array.elements.iter());
+                let value = visitor.visit_seq(&mut elements)?;
+                if elements.0.next().is_some() {
+                    let taken = array.elements.len() - elements.0.len() - 1;
+                    return Err(NodeError::new(String::new(), format!("an array of {taken}")));
+                }
+                Ok(value)
+            }
+            Value::Object(object) => visitor.visit_map(Members {
+                all: &object.properties,
+                next: 0,
+                seen: std::collections::HashSet::new(),
+            }),
+        }
+    }
+}
+
+impl<'de> de::Deserializer<'de> for Node<'_> {
+    type Error = NodeError;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, NodeError> {
+        self.visit(visitor).map_err(|error| error.at(self.0))
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, NodeError> {
+        match self.0 {
+            Value::NullKeyword(_) => visitor.visit_none(),
+            node => visitor.visit_some(Node(node)),
+        }
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, NodeError> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, NodeError> {
+        let result = match self.0 {
+            Value::StringLit(s) => {
+                let name: StrDeserializer<'_, NodeError> = s.value.as_ref().into_deserializer();
+                visitor.visit_enum(name)
+            }
+            _ => Err(NodeError::new(String::new(), "a string".to_owned())),
+        };
+        result.map_err(|error| error.at(self.0))
+    }
+
+    forward_to_deserialize_any! {
+        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct seq tuple
+        tuple_struct map struct identifier ignored_any
+    }
+}
+
+struct Elements<'a>(std::slice::Iter<'a, Value<'a>>);
+
+impl<'de> de::SeqAccess<'de> for &mut Elements<'_> {
+    type Error = NodeError;
+
+    fn next_element_seed<T: DeserializeSeed<'de>>(&mut self, seed: T) -> Result<Option<T::Value>, NodeError> {
+        self.0.next().map(|value| seed.deserialize(Node(value))).transpose()
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.0.len())
+    }
+}
+
+struct Members<'a> {
+    all: &'a [jsonc_parser::ast::ObjectProp<'a>],
+    next: usize,
+    seen: std::collections::HashSet<&'a str>,
+}
+
+impl<'de> de::MapAccess<'de> for Members<'_> {
+    type Error = NodeError;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, NodeError> {
+        let Some(member) = self.all.get(self.next) else { return Ok(None) };
+        let name = match &member.name {
+            ObjectPropName::String(s) => s.value.as_ref(),
+            ObjectPropName::Word(w) => w.value,
+        };
+        let offset = member.name.range().start;
+        if !self.seen.insert(name) {
+            let mut error =
+                NodeError::new(format!("{name:?} again"), "each name once in an object".to_owned());
+            error.offset = Some(offset);
+            return Err(error);
+        }
+        let key: StrDeserializer<'_, NodeError> = name.into_deserializer();
+        seed.deserialize(key).map(Some).map_err(|mut error| {
+            error.offset.get_or_insert(offset);
+            error
+        })
+    }
+
+    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, NodeError> {
+        let member = self.all.get(self.next).ok_or_else(|| {
+            NodeError::new("a value without a name".to_owned(), "a name before each value".to_owned())
+        })?;
+        self.next += 1;
+        seed.deserialize(Node(&member.value))
+    }
+}

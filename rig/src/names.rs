@@ -1,0 +1,460 @@
+//! Names of blend shapes, zones and distributions: what a rigger writes against what a head has.
+//!
+//! ```text
+//! "EyeBlink_L"  \
+//! "eyeBlinkLeft" >-- Key { base: "eyeblink", side: Left } --> shapes of the head with their factors
+//! "eye blink l" /
+//! ```
+//!
+//! ARKit's names are canonical. Letter case, spaces, dashes, underscores and the way a side is written do not count.
+//! ICT FaceKit splits `browInnerUp` and `cheekPuff` into halves: one written name may drive two shapes of a head,
+//! and two written halves share the one shape of a head that has no halves.
+
+use crate::head::Head;
+
+/// The 52 blend shapes of Apple's ARKit face anchor, canonical spelling.
+pub const ARKIT: [&str; 52] = [
+    "browDownLeft",
+    "browDownRight",
+    "browInnerUp",
+    "browOuterUpLeft",
+    "browOuterUpRight",
+    "cheekPuff",
+    "cheekSquintLeft",
+    "cheekSquintRight",
+    "eyeBlinkLeft",
+    "eyeBlinkRight",
+    "eyeLookDownLeft",
+    "eyeLookDownRight",
+    "eyeLookInLeft",
+    "eyeLookInRight",
+    "eyeLookOutLeft",
+    "eyeLookOutRight",
+    "eyeLookUpLeft",
+    "eyeLookUpRight",
+    "eyeSquintLeft",
+    "eyeSquintRight",
+    "eyeWideLeft",
+    "eyeWideRight",
+    "jawForward",
+    "jawLeft",
+    "jawOpen",
+    "jawRight",
+    "mouthClose",
+    "mouthDimpleLeft",
+    "mouthDimpleRight",
+    "mouthFrownLeft",
+    "mouthFrownRight",
+    "mouthFunnel",
+    "mouthLeft",
+    "mouthLowerDownLeft",
+    "mouthLowerDownRight",
+    "mouthPressLeft",
+    "mouthPressRight",
+    "mouthPucker",
+    "mouthRight",
+    "mouthRollLower",
+    "mouthRollUpper",
+    "mouthShrugLower",
+    "mouthShrugUpper",
+    "mouthSmileLeft",
+    "mouthSmileRight",
+    "mouthStretchLeft",
+    "mouthStretchRight",
+    "mouthUpperUpLeft",
+    "mouthUpperUpRight",
+    "noseSneerLeft",
+    "noseSneerRight",
+    "tongueOut",
+];
+
+/// Shapes of ICT FaceKit that ARKit does not have, in canonical spelling.
+pub const ICT_EXTRA: [&str; 8] = [
+    "browInnerUpLeft",
+    "browInnerUpRight",
+    "cheekPuffLeft",
+    "cheekPuffRight",
+    "cheekRaiserLeft",
+    "cheekRaiserRight",
+    "pupilDilateLeft",
+    "pupilDilateRight",
+];
+
+/// Half of the face, the character's own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Side {
+    /// +X.
+    Left,
+    /// -X.
+    Right,
+}
+
+/// A name without its spelling.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Key {
+    /// Lower case letters and digits of the name without its side.
+    pub base: String,
+    /// Half of the face that the name ends in.
+    pub side: Option<Side>,
+}
+
+impl Key {
+    /// Reads a name as written: `eyeBlink_L`, `eyeBlinkLeft`, `EYEBLINK-LEFT`, `eyeBlinkL`, `Eye Blink left` are one key.
+    /// An `L` or `R` is a side after a separator or as a capital after a small letter, so `mouthRollLower` has none.
+    pub fn new(written: &str) -> Self {
+        let is_separator = |c: char| !c.is_alphanumeric();
+        let trimmed = written.trim_matches(is_separator);
+        let mut side = None;
+        let mut stem = trimmed;
+        let mut last_two = trimmed.chars().rev();
+        if let (Some(last), Some(before)) = (last_two.next(), last_two.next()) {
+            let marks_side = is_separator(before) || (before.is_lowercase() && last.is_uppercase());
+            side = match last {
+                'L' | 'l' if marks_side => Some(Side::Left),
+                'R' | 'r' if marks_side => Some(Side::Right),
+                _ => None,
+            };
+            if side.is_some() {
+                stem = &trimmed[..trimmed.len() - last.len_utf8()];
+            }
+        }
+        let mut base: String =
+            stem.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+        if side.is_none() {
+            for (word, this) in [("left", Side::Left), ("right", Side::Right)] {
+                if base.len() > word.len() && base.ends_with(word) {
+                    base.truncate(base.len() - word.len());
+                    side = Some(this);
+                    break;
+                }
+            }
+        }
+        Self { base, side }
+    }
+
+    fn with_side(&self, side: Option<Side>) -> Self {
+        Self { base: self.base.clone(), side }
+    }
+
+    /// `jawLeft` and `jawRight` move the whole jaw and are no halves of a `jaw`; the same holds for the mouth.
+    fn has_halves(&self) -> bool {
+        self.base != "jaw" && self.base != "mouth"
+    }
+}
+
+/// Canonical spelling of a known shape name (ARKit or ICT FaceKit), such as `eyeBlinkLeft` for `EyeBlink_L`.
+///
+/// A prefix that an exporter put before the last `.`, `:` or `|` is dropped: `blendShape1.jawOpen`.
+///
+/// ```
+/// use rubor_rig::names::canonical;
+/// assert_eq!(canonical("eyeBlink_L"), Some("eyeBlinkLeft"));
+/// assert_eq!(canonical("brow inner up-r"), Some("browInnerUpRight"));
+/// assert_eq!(canonical("eyeBlink"), None); // a pair, not a shape
+/// ```
+pub fn canonical(written: &str) -> Option<&'static str> {
+    let find = |name: &str| {
+        let key = Key::new(name);
+        vocabulary().find(|known| Key::new(known) == key)
+    };
+    find(written).or_else(|| find(written.rsplit(['.', ':', '|']).next()?))
+}
+
+/// Every shape name that rubor knows without a head.
+pub fn vocabulary() -> impl Iterator<Item = &'static str> {
+    ARKIT.into_iter().chain(ICT_EXTRA)
+}
+
+/// True for a name that [`canonical`] knows, or that is both halves of one: `eyeBlink`, `cheekRaiser`.
+pub fn is_known_shape(written: &str) -> bool {
+    if canonical(written).is_some() {
+        return true;
+    }
+    let key = Key::new(written);
+    key.side.is_none() && key.has_halves() && vocabulary().map(Key::new).any(|k| k.base == key.base)
+}
+
+/// One thing of a head that a written name drives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// Index into the list that the [`Resolver`] was made from.
+    pub index: u32,
+    /// Share of the written weight that it gets: 1, or 1/2 where two written halves meet in one shape.
+    pub factor: f32,
+}
+
+/// Finds written names among the names of a head.
+#[derive(Clone, Debug)]
+pub struct Resolver {
+    names: Vec<String>,
+    keys: Vec<Key>,
+}
+
+impl Resolver {
+    /// For any list of names; indices of targets are places in it.
+    pub fn new<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
+        let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
+        let keys = names.iter().map(|n| Key::new(canonical(n).unwrap_or(n))).collect();
+        Self { names, keys }
+    }
+
+    /// For the blend shapes of a head.
+    pub fn shapes(head: &Head) -> Self {
+        Self::new(head.shapes.iter().map(|s| s.name.as_str()))
+    }
+
+    /// For the wrinkle zones of a head.
+    pub fn zones(head: &Head) -> Self {
+        Self::new(head.maps.zones.iter().map(|z| z.name.as_str()))
+    }
+
+    /// For the hemoglobin distributions of a head.
+    pub fn distributions(head: &Head) -> Self {
+        Self::new(head.maps.distributions.iter().map(|d| d.name.as_str()))
+    }
+
+    /// What a written name drives; empty if the head has nothing of that name. In this order:
+    /// 1. the exact name,
+    /// 2. the same name in another spelling,
+    /// 3. both halves, for a name without a side (`browInnerUp` on a head with `browInnerUp_L` and `_R`),
+    /// 4. the undivided shape at half the weight, for a half (`cheekPuffLeft` on a head with `cheekPuff`).
+    pub fn resolve(&self, written: &str) -> Vec<Target> {
+        let whole = |index: usize| Target { index: index as u32, factor: 1.0 };
+        if let Some(index) = self.names.iter().position(|n| n == written) {
+            return vec![whole(index)];
+        }
+        let key = Key::new(canonical(written).unwrap_or(written));
+        let find = |key: &Key| self.keys.iter().position(|k| k == key);
+        if let Some(index) = find(&key) {
+            return vec![whole(index)];
+        }
+        if !key.has_halves() {
+            return Vec::new();
+        }
+        match key.side {
+            None => [Side::Left, Side::Right]
+                .iter()
+                .filter_map(|side| find(&key.with_side(Some(*side))))
+                .map(whole)
+                .collect(),
+            Some(_) => find(&key.with_side(None))
+                .map(|index| Target { index: index as u32, factor: 0.5 })
+                .into_iter()
+                .collect(),
+        }
+    }
+
+    /// Names as the head spells them.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.names.iter().map(String::as_str)
+    }
+
+    /// True for a head that has none.
+    pub fn is_empty(&self) -> bool {
+        self.names.is_empty()
+    }
+}
+
+/// The candidate that is most like `written` without regard to letter case; `None` if none is like it at all.
+///
+/// ```
+/// let emotions = ["joy", "anger", "sadness"];
+/// assert_eq!(rubor_rig::names::nearest("angr", emotions), Some("anger".to_owned()));
+/// assert_eq!(rubor_rig::names::nearest("q", emotions), None);
+/// ```
+pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    // Below this Jaro-Winkler similarity a guess helps nobody; judged on misspelt ARKit names.
+    const LEAST_SIMILARITY: f64 = 0.72;
+    let lower = written.to_lowercase();
+    let mut best: Option<(f64, &str)> = None;
+    for candidate in candidates {
+        let other = candidate.to_lowercase();
+        let winkler = strsim::jaro_winkler(&lower, &other);
+        if winkler < LEAST_SIMILARITY {
+            continue;
+        }
+        // Winkler's bonus for a common start alone would prefer a short name to a long one with a slip in it.
+        let similarity = winkler + strsim::normalized_damerau_levenshtein(&lower, &other);
+        if best.is_none_or(|(most, _)| similarity > most) {
+            best = Some((similarity, candidate));
+        }
+    }
+    best.map(|(_, name)| name.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names of the files of ICT FaceKit's light model.
+    const ICT: [&str; 57] = [
+        "PupilDilate_L",
+        "PupilDilate_R",
+        "browDown_L",
+        "browDown_R",
+        "browInnerUp_L",
+        "browInnerUp_R",
+        "browOuterUp_L",
+        "browOuterUp_R",
+        "cheekPuff_L",
+        "cheekPuff_R",
+        "cheekRaiser_L",
+        "cheekRaiser_R",
+        "cheekSquint_L",
+        "cheekSquint_R",
+        "eyeBlink_L",
+        "eyeBlink_R",
+        "eyeLookDown_L",
+        "eyeLookDown_R",
+        "eyeLookIn_L",
+        "eyeLookIn_R",
+        "eyeLookOut_L",
+        "eyeLookOut_R",
+        "eyeLookUp_L",
+        "eyeLookUp_R",
+        "eyeSquint_L",
+        "eyeSquint_R",
+        "eyeWide_L",
+        "eyeWide_R",
+        "jawForward",
+        "jawLeft",
+        "jawOpen",
+        "jawRight",
+        "mouthClose",
+        "mouthDimple_L",
+        "mouthDimple_R",
+        "mouthFrown_L",
+        "mouthFrown_R",
+        "mouthFunnel",
+        "mouthLeft",
+        "mouthLowerDown_L",
+        "mouthLowerDown_R",
+        "mouthPress_L",
+        "mouthPress_R",
+        "mouthPucker",
+        "mouthRight",
+        "mouthRollLower",
+        "mouthRollUpper",
+        "mouthShrugLower",
+        "mouthShrugUpper",
+        "mouthSmile_L",
+        "mouthSmile_R",
+        "mouthStretch_L",
+        "mouthStretch_R",
+        "mouthUpperUp_L",
+        "mouthUpperUp_R",
+        "noseSneer_L",
+        "noseSneer_R",
+    ];
+
+    fn resolved(resolver: &Resolver, written: &str) -> Vec<(String, f32)> {
+        let names: Vec<&str> = resolver.names().collect();
+        resolver.resolve(written).iter().map(|t| (names[t.index as usize].to_owned(), t.factor)).collect()
+    }
+
+    #[test]
+    fn every_arkit_name_is_its_own_canonical_name_and_keys_differ() {
+        let mut keys: Vec<Key> = vocabulary().map(Key::new).collect();
+        keys.sort();
+        keys.dedup();
+        assert_eq!(keys.len(), ARKIT.len() + ICT_EXTRA.len());
+        for name in vocabulary() {
+            assert_eq!(canonical(name), Some(name));
+        }
+    }
+
+    #[test]
+    fn every_ict_file_has_a_canonical_name() {
+        for name in ICT {
+            let known = canonical(name).unwrap_or_else(|| panic!("{name} is unknown"));
+            assert_eq!(
+                known.to_lowercase(),
+                name.replace("_L", "Left").replace("_R", "Right").to_lowercase()
+            );
+        }
+    }
+
+    #[test]
+    fn every_arkit_shape_but_the_tongue_drives_the_ict_head() {
+        let ict = Resolver::new(ICT);
+        for name in ARKIT {
+            let expected = match name {
+                "tongueOut" => 0,
+                "browInnerUp" | "cheekPuff" => 2,
+                _ => 1,
+            };
+            assert_eq!(ict.resolve(name).len(), expected, "{name}");
+        }
+        assert_eq!(
+            resolved(&ict, "browInnerUp"),
+            [("browInnerUp_L".to_owned(), 1.0), ("browInnerUp_R".to_owned(), 1.0)]
+        );
+        assert_eq!(resolved(&ict, "cheekPuffLeft"), [("cheekPuff_L".to_owned(), 1.0)]);
+        assert_eq!(resolved(&ict, "jawLeft"), [("jawLeft".to_owned(), 1.0)]);
+    }
+
+    #[test]
+    fn ict_names_drive_an_arkit_head_and_halves_share_a_shape() {
+        let arkit = Resolver::new(ARKIT);
+        for name in ICT {
+            let expected = usize::from(!name.starts_with("PupilDilate") && !name.starts_with("cheekRaiser"));
+            assert_eq!(arkit.resolve(name).len(), expected, "{name}");
+        }
+        assert_eq!(resolved(&arkit, "browInnerUp_L"), [("browInnerUp".to_owned(), 0.5)]);
+        assert_eq!(resolved(&arkit, "browInnerUp_R"), [("browInnerUp".to_owned(), 0.5)]);
+        assert_eq!(resolved(&arkit, "eyeBlink").len(), 2);
+    }
+
+    #[test]
+    fn spellings_of_one_name() {
+        for written in [
+            "eyeBlinkLeft",
+            "EyeBlinkLeft",
+            "eyeBlink_L",
+            "eyeblink_l",
+            "EYEBLINK_L",
+            "EYEBLINKLEFT",
+            "eye blink left",
+            "eye-blink-l",
+            "eyeBlink.L",
+            "eyeBlinkL",
+            "eyeBlink_Left",
+            "blendShape1.eyeBlink_L",
+            "Face:eyeBlinkLeft",
+        ] {
+            assert_eq!(canonical(written), Some("eyeBlinkLeft"), "{written}");
+        }
+        assert_eq!(canonical("mouthRollLower"), Some("mouthRollLower"));
+        assert_eq!(canonical("mouth_L"), Some("mouthLeft"));
+        for not_a_shape in ["", "_", "L", "left", "mouth", "jaw", "é", "eyeBlinkLeftLeft"] {
+            assert_eq!(canonical(not_a_shape), None, "{not_a_shape}");
+        }
+    }
+
+    #[test]
+    fn mouth_and_jaw_are_no_pairs() {
+        let arkit = Resolver::new(ARKIT);
+        for name in ["mouth", "jaw"] {
+            assert!(arkit.resolve(name).is_empty());
+            assert!(!is_known_shape(name));
+        }
+        assert!(is_known_shape("cheekRaiser"));
+        assert!(is_known_shape("EyeBlink"));
+        assert!(!is_known_shape("eyeBlinks"));
+    }
+
+    #[test]
+    fn the_nearest_name_of_a_misspelling() {
+        for (written, expected) in [
+            ("eyeBlnkLeft", "eyeBlinkLeft"),
+            ("mouthSmilLeft", "mouthSmileLeft"),
+            ("browInerUp", "browInnerUp"),
+            ("jawOpne", "jawOpen"),
+            ("mouthLowerDownLft", "mouthLowerDownLeft"),
+        ] {
+            assert_eq!(nearest(written, ARKIT).as_deref(), Some(expected));
+        }
+        assert_eq!(nearest("xyzzy", ARKIT), None);
+        assert_eq!(nearest("anything", []), None);
+    }
+}
