@@ -5,6 +5,25 @@
 //! glTF / GLB ------+--> import --> Head --> convert --------+
 //! MakeHuman data --+                (occlusion)             +--> animated .glb
 //! ```
+//!
+//! ```
+//! use rubor_assets::{export, import};
+//! use rubor_rig::head::{Head, Material, Mesh, Part, Vertex};
+//!
+//! let corner = |x: f32, y: f32| glam::Vec3::new(x, y, 0.0);
+//! let mesh = Mesh {
+//!     points: vec![corner(0.0, 0.0), corner(0.1, 0.0), corner(0.0, 0.1)],
+//!     vertices: (0..3).map(|point| Vertex { point, uv: glam::Vec2::ZERO }).collect(),
+//!     triangles: vec![[0, 1, 2]],
+//!     parts: vec![Part { name: "face".into(), material: Material::Skin, triangles: 0..1 }],
+//!     ..Mesh::default()
+//! };
+//! let head = Head { name: "triangle".into(), mesh, ..Head::default() };
+//! let glb = export::gltf::to_bytes(&head, &export::gltf::Options::default())?;
+//! let read = import::gltf::from_bytes(&glb, "triangle.glb".as_ref())?;
+//! assert_eq!(read.head.mesh, head.mesh);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod convert;
 pub mod error;

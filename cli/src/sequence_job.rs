@@ -31,6 +31,7 @@ use crate::{contact_sheet, output, video};
 
 /// What `render` and `demo` have in common.
 #[derive(clap::Args)]
+#[group(skip)]
 pub(crate) struct Arguments {
     /// Folder for the results; made if missing
     #[arg(short, long, value_name = "DIR")]
@@ -303,7 +304,7 @@ fn export_animated(job: &Job, evaluators: &[Evaluator], folder: &Path) -> Outcom
         })
         .collect();
     let options = export::gltf::Options {
-        base_color: neutral_color(&loaded.head),
+        base_color: neutral_color(&loaded.head, 2048),
         rig: Some(serde_json::to_value(&job.rig).map_err(Failure::job)?),
         frames,
         ..export::gltf::Options::default()
@@ -311,15 +312,16 @@ fn export_animated(job: &Job, evaluators: &[Evaluator], folder: &Path) -> Outcom
     export::gltf::write(&loaded.head, &options, &folder.join(HEAD_FILE)).map_err(Failure::job)
 }
 
-/// The skin of the neutral face as other viewers show it: sRGB, from the chromophore maps.
-pub(crate) fn neutral_color(head: &Head) -> Option<RgbImage> {
+/// The skin of the neutral face as other viewers show it: sRGB, from the chromophore maps, at most
+/// `side` texels wide.
+pub(crate) fn neutral_color(head: &Head, side: u32) -> Option<RgbImage> {
     let maps = &head.maps;
     let (melanin, hemoglobin) = (maps.melanin.as_ref()?, maps.hemoglobin.as_ref()?);
     if !head.mesh.parts.iter().any(|p| p.material == Material::Skin) {
         return None;
     }
     let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
-    let side = melanin.width.max(hemoglobin.width).min(2048);
+    let side = melanin.width.max(hemoglobin.width).min(side);
     Some(RgbImage::from_fn(side, side, |x, y| {
         let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
         let skin = lookup.sample(melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));

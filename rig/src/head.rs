@@ -82,7 +82,8 @@ pub enum Material {
     Mucosa,
     /// Eyeball. `uv` = (0.5, 0.5) + (cos phi, sin phi) theta / (2 pi), where theta is the rest angle from the pupil
     /// axis at the centre of the eye and phi the rest angle around it (phi = 0 towards +X, pi/2 towards -Y,
-    /// as v grows downwards). Iris and pupil are circles about (0.5, 0.5).
+    /// as v grows downwards). Iris and pupil are circles about (0.5, 0.5). Importers stretch theta so that the limbus,
+    /// the rim of the iris, has the texture radius 0.0819 on every eye: asin(5.9 / 12) / (2 pi), an anatomical one.
     Eye,
     /// Teeth.
     Teeth,

@@ -198,7 +198,7 @@ fn find_neutral(options: &Options, files: &[PathBuf]) -> Result<PathBuf, ImportE
         return Ok(if inside.exists() { inside } else { neutral.clone() });
     }
     let named = |name: &&str| files.iter().find(|f| file_stem(f).to_lowercase() == **name);
-    NEUTRAL_NAMES.iter().find_map(|name| named(name)).cloned().ok_or_else(|| {
+    NEUTRAL_NAMES.iter().find_map(named).cloned().ok_or_else(|| {
         let found = format!("{} OBJ files, none of them", files.len());
         ImportError::content(
             &options.folder,

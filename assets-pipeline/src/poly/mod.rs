@@ -173,6 +173,9 @@ impl PolyMesh {
     }
 }
 
+#[cfg(test)]
+mod tests;
+
 fn move_shapes(shapes: &[Shape], stencils: &Stencils) -> Vec<Shape> {
     let moved = |s: &Shape| Shape { name: s.name.clone(), offsets: stencils.apply(&s.offsets) };
     shapes.iter().map(moved).collect()

@@ -108,9 +108,8 @@ pub(super) fn catmull_clark(
     }
     let mut quads = Vec::with_capacity(corners.len());
     let (first_edge, first_face) = (count as u32, (count + edges.len()) as u32);
-    for f in 0..face_count {
-        let face = face(f);
-        let start = face_starts[f] as usize;
+    for (f, start) in face_starts[..face_count].iter().enumerate() {
+        let (face, start) = (face(f), *start as usize);
         face.iter().for_each(|q| row.add(*q, 1.0 / face.len() as f32));
         row.finish(&mut stencils);
         for (k, p) in face.iter().enumerate() {

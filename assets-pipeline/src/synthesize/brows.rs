@@ -36,8 +36,6 @@ pub(crate) struct Hairs {
     finest_mm: f32,
     stubble: f32,
     scalp: f32,
-    /// Melanin fraction that stands for hair.
-    pub melanin: f32,
 }
 
 impl Hairs {
@@ -62,7 +60,6 @@ impl Hairs {
             finest_mm: texel_mm,
             stubble: options.stubble,
             scalp: options.scalp_hair,
-            melanin: options.hair_melanin,
         }
     }
 

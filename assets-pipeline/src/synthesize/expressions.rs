@@ -178,18 +178,14 @@ fn response(state: &State, index: usize, side: f32, place: Vec3, r: &Regions, se
 
 /// Neutral and all states as statistics in discs of `radius_px` texels of `coverage`.
 ///
-/// The first is named `neutral`: its bias is `mu_n` (`bias_0` of eq. 7.5) and its scale 1, so that who blends them
-/// needs no other map. `hemoglobin` gives the regions, the mean and the value of the neutral map at a place.
+/// The map is `mu_n` (`bias_0` of eq. 7.5). `hemoglobin` gives the regions, the mean and the value of the neutral map at a place.
 pub(crate) fn distributions(
     coverage: &Coverage<'_>,
     radius_px: u32,
     size: u32,
     seed: u32,
-) -> (Map, Vec<Distribution>) {
-    // A quarter of a million texels carry the statistics of any map.
-    let stride = (full.resolution() / 512).max(1);
     hemoglobin: impl Fn(Vec3) -> (Regions, f32, f32) + Sync,
-) -> Result<Vec<Distribution>, HemoglobinError> {
+) -> Result<(Map, Vec<Distribution>), HemoglobinError> {
     let mut stream = Stream::new(seed ^ 0x51de);
     let sides: Vec<f32> = STATES.iter().map(|_| (0.045 * stream.normal()).clamp(-0.09, 0.09)).collect();
     let side = coverage.resolution();
@@ -201,59 +197,6 @@ pub(crate) fn distributions(
             Some((place, r, mean, value))
         })
         .collect();
-    let described: Vec<(Vec3, f32, f32, f32, Regions)> = sampled
-        .par_iter()
-        .map(|(site, area, value)| {
-            let r = Regions::at(site.place);
-            (site.place, *area, *value, chromophores.hemoglobin_mean(site.place, &r), r)
-        })
-        .collect();
-    let base: Vec<Sample> = described
-        .iter()
-        .map(|(place, area, value, _, _)| Sample { place: *place, area: *area, value: *value })
-        .collect();
-    let neutral_statistics = LocalStatistics::of(&base);
-    let sites: Vec<Option<Site>> = (0..low.resolution())
-        .flat_map(|y| (0..low.resolution()).map(move |x| (x, y)))
-        .map(|(x, y)| low.site(x, y))
-        .collect();
-    let mut neutral_mean = Map::filled(low.resolution(), low.resolution(), &[0.0]);
-    for (value, site) in neutral_mean.values.iter_mut().zip(&sites) {
-        if let Some(site) = site {
-            *value = neutral_statistics.at(site.place).0;
-        }
-    }
-    low.fill_empty(&mut neutral_mean);
-    let distributions = STATES
-        .par_iter()
-        .enumerate()
-        .map(|(index, state)| {
-            let samples: Vec<Sample> = described
-                .iter()
-                .map(|(place, area, value, mean, r)| {
-                    let (gain, spread) = response(state, index, sides[index], *place, r, seed);
-                    Sample { place: *place, area: *area, value: gain * (mean + spread * (value - mean)) }
-                })
-                .collect();
-            let target = LocalStatistics::of(&samples);
-            let mut scale = Map::filled(low.resolution(), low.resolution(), &[1.0]);
-            let mut bias = Map::filled(low.resolution(), low.resolution(), &[0.0]);
-            for (i, site) in sites.iter().enumerate() {
-                if let Some(site) = site {
-                    let (mean, deviation) = target.at(site.place);
-                    let (_, neutral_deviation) = neutral_statistics.at(site.place);
-                    // Where the neutral map is flat there is no pattern to scale.
-                    scale.values[i] =
-                        if neutral_deviation > 1e-6 { (deviation / neutral_deviation).min(4.0) } else { 1.0 };
-                    bias.values[i] = mean;
-                }
-            }
-            low.fill_empty(&mut scale);
-            low.fill_empty(&mut bias);
-            Distribution { name: state.name.into(), scale, bias }
-        })
-        .collect();
-    (neutral_mean, distributions)
     let mask = Mask { width: side, height: side, mapped: sites.iter().map(Option::is_some).collect() };
     let map_of = |value: &(dyn Fn(&(Vec3, Regions, f32, f32)) -> f32 + Sync)| Map {
         width: side,
@@ -262,12 +205,7 @@ pub(crate) fn distributions(
         values: sites.par_iter().map(|s| s.as_ref().map_or(0.0, value)).collect(),
     };
     let neutral = hemoglobin::neutral(&map_of(&|(_, _, _, value)| *value), &mask, radius_px, size)?;
-    let unchanged = Distribution {
-        name: "neutral".into(),
-        scale: Map::filled(neutral.mean.width, neutral.mean.height, &[1.0]),
-        bias: neutral.mean.clone(),
-    };
-    let mut all = vec![unchanged];
+    let mut all = Vec::new();
     for (index, state) in STATES.iter().enumerate() {
         let target = map_of(&|(place, r, mean, value)| {
             let (gain, spread) = response(state, index, sides[index], *place, r, seed);
@@ -275,5 +213,5 @@ pub(crate) fn distributions(
         });
         all.push(hemoglobin::distribution(state.name, &neutral, &target, &mask, radius_px, size)?);
     }
-    Ok(all)
+    Ok((neutral.mean, all))
 }

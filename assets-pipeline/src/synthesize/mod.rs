@@ -163,8 +163,7 @@ pub enum SynthesizeError {
 ///
 /// Melanin, hemoglobin and slopes have the resolution of the options; wrinkle slopes, specular and scattering half of
 /// it; distributions [`DISTRIBUTION_RESOLUTION`], zone masks [`MASK_RESOLUTION`]. Texels without skin hold means of
-/// the skin about them. The distributions begin with
-/// one named `neutral`, whose bias is the local mean of the neutral map. Landmarks that a head lacks are done without; with fewer than six the maps are placed by the
+/// the skin about them. Landmarks that a head lacks are done without; with fewer than six the maps are placed by the
 /// head's bounds, which is rough.
 ///
 /// # Errors
@@ -185,20 +184,20 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let texel_mm = surface.texel_mm(options.resolution);
     let relief = Relief::new(seed, texel_mm, options.age_years);
     let hairs = Hairs::new(options, texel_mm);
-    let mut detailed = full.bake::<4>(&[1, 1, 2], |site| {
+    let mut detailed = full.bake::<5>(&[1, 1, 2, 1], |site| {
         let r = Regions::at(site.place);
         let relief = relief.sample(site, &r);
         let hair = hairs.cover(site.place, &r);
         let melanin = chromophores.melanin(site.place, &r, relief.cavity);
-        let melanin = melanin + hair * (hairs.melanin - melanin);
         let hemoglobin = chromophores.hemoglobin_with_mean(site.place, &r).1 * hemoglobin_under_hair(hair);
         let mut gradient = relief.gradient;
         if Wrinkles::reach(site.place) {
             gradient += lasting * wrinkles.gradient(site.place);
         }
         let [x, y] = site.slopes(gradient);
-        [melanin.clamp(0.0, 0.5), hemoglobin.clamp(0.0, 0.32), x, y]
+        [melanin.clamp(0.0, 0.5), hemoglobin.clamp(0.0, 0.32), x, y, hair]
     });
+    let hair = detailed.pop();
     let slopes = detailed.pop();
     let hemoglobin = detailed.pop();
     let melanin = detailed.pop();
@@ -220,16 +219,11 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let specular = broad.pop();
     let wrinkle_slopes = broad;
 
-    let low = surface.rasterise(DISTRIBUTION_RESOLUTION);
-    let (hemoglobin_mean, distributions) = hemoglobin
-        .as_ref()
-        .map(|neutral| expressions::distributions(&chromophores, &full, neutral, &low, seed))
-        .unzip();
     let coarse = surface.rasterise(STATISTICS_RESOLUTION);
     let texel_mm = surface.texel_mm(STATISTICS_RESOLUTION);
     let radius_px = (STATISTICS_RADIUS_MM / texel_mm).round().clamp(2.0, 64.0) as u32;
     let coarse_hairs = Hairs::new(options, texel_mm);
-    let distributions =
+    let (hemoglobin_mean, distributions) =
         expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |place| {
             let r = Regions::at(place);
             let factor = hemoglobin_under_hair(coarse_hairs.cover(place, &r));
@@ -246,16 +240,21 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     Ok(SkinMaps {
         melanin,
         hemoglobin,
-        hemoglobin_mean,
-        distributions: distributions.unwrap_or_default(),
+        hemoglobin_mean: Some(hemoglobin_mean),
+        distributions,
         slopes,
         wrinkle_slopes,
         zones,
         specular,
         scattering,
-        hair: None,
-        hair_color_linear: [0.0; 3],
+        hair,
+        hair_color_linear: hair_color_linear(options.hair_melanin),
     })
+}
+
+/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and dark brown (0.5).
+fn hair_color_linear(melanin: f32) -> [f32; 3] {
+    [(0.80, 6.2), (0.72, 7.0), (0.60, 7.8)].map(|(root, absorption)| root * (-absorption * melanin).exp())
 }
 
 /// What hair leaves of the colour of blood.

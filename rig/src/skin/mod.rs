@@ -22,8 +22,8 @@
 //! assert!((red - 1.0).abs() < 1e-12);
 //! ```
 
-pub mod chromophores;
 pub mod accuracy;
+pub mod chromophores;
 pub mod diffusion;
 pub mod fit;
 pub mod gaussians;

@@ -232,7 +232,7 @@ fn check_frames(head: &Head, frames: &[Frame]) -> Result<(), ExportError> {
         if !finite {
             return fail(i, "a number that is not finite".into(), "finite weights and motion".into());
         }
-        if !(frame.time_s >= 0.0) || (i > 0 && frame.time_s <= frames[i - 1].time_s) {
+        if frame.time_s.is_nan() || frame.time_s < 0.0 || (i > 0 && frame.time_s <= frames[i - 1].time_s) {
             return fail(i, format!("time {} s", frame.time_s), "strictly increasing times from 0".into());
         }
     }

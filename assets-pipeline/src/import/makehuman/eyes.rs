@@ -15,12 +15,14 @@ const HELPERS: [(&str, std::ops::Range<usize>); 2] =
 
 /// Radius of curvature of the cornea, metres (Gullstrand's eye: 7.7 mm; larger here because the base mesh's eyeball is).
 const CORNEA_RADIUS: f32 = 0.0085;
-/// From the centre of the helper ball to that of the eye: outwards and up, metres. The opening of the lids lies outside
-/// and below the middle of the helper; without this the face squints. Set by eye on the default head.
-const SHIFT: (f32, f32) = (0.0010, -0.0010);
-/// Turn of the pupil axis outwards and down, radians: 3 and 2 degrees. The pupil axis of a human eye that looks at
+/// From the centre of the helper ball down to that of the eye, metres, and its size as part of the helper's: the lids
+/// open below the helper's middle, and Catmull-Clark draws them closer to the ball. Set by eye on the default head, so that
+/// no shape pushes the ball through a lid.
+const LOWERED: f32 = 0.0006;
+const SHRINK: f32 = 0.985;
+/// Turn of the pupil axis outwards and down, radians: 4 and 3 degrees. The pupil axis of a human eye that looks at
 /// something stands 3 to 5 degrees outside of the line of sight (angle kappa).
-const TURN: (f32, f32) = (0.052, 0.035);
+const TURN: (f32, f32) = (0.070, 0.052);
 /// Segments around the axis.
 const SEGMENTS: u32 = 32;
 /// An eyeball and how the shapes turn it.
@@ -37,8 +39,7 @@ pub(super) fn fit(mesh: &PolyMesh, shapes: &[Shape]) -> Vec<Eye> {
     let eye = |(group, range): &(&'static str, std::ops::Range<usize>)| {
         let points = &mesh.points[range.clone()];
         let (middle, radius) = fit_sphere(points);
-        let side = middle.x.signum();
-        let center = middle + Vec3::new(SHIFT.0 * side, SHIFT.1, 0.0);
+        let (center, radius) = (middle - LOWERED * Vec3::Y, SHRINK * radius);
         let moves = (shapes.iter().enumerate())
             .filter(|(_, s)| s.offsets[range.clone()].iter().any(|o| *o != Vec3::ZERO))
             .map(|(i, s)| {

@@ -14,6 +14,7 @@ mod lashes;
 mod layout;
 mod targets;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use glam::Vec3;
@@ -56,6 +57,8 @@ pub struct Options {
     pub height: f32,
     /// More targets by their path under `mpfb2/targets` without extension, such as `nose/nose-hump-incr`.
     pub targets: Vec<(String, f32)>,
+    /// Part of `jawOpen` that is taken back at rest: the lips of the base mesh stand apart by about a millimetre.
+    pub lip_seal: f32,
     /// Catmull-Clark steps, 0 to 2.
     pub subdivide: u32,
     /// Rays a point for ambient occlusion; 0 leaves it out.
@@ -67,14 +70,19 @@ impl Default for Options {
         Self {
             data: PathBuf::from("data"),
             name: "default".into(),
-            ethnicity: [1.0, 0.0, 0.0],
-            gender: 1.0,
+            ethnicity: [0.6, 0.1, 0.3],
+            gender: 0.75,
             age: 0.5,
-            muscle: 0.5,
+            muscle: 0.6,
             weight: 0.5,
-            proportions: 0.5,
+            proportions: 1.0,
             height: 0.5,
-            targets: Vec::new(),
+            targets: vec![
+                ("head/head-oval".into(), 0.3),
+                ("eyes/l-eye-height2-incr".into(), 0.4),
+                ("eyes/r-eye-height2-incr".into(), 0.4),
+            ],
+            lip_seal: 0.06,
             subdivide: 1,
             occlusion_rays: 128,
         }
@@ -123,12 +131,17 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     let mut shapes =
         targets::face_units(&options.data.join("faceunits01/targets/faceunits"), mesh.points.len())?;
 
+    if let Some(jaw) = shapes.iter().find(|s| s.name == "jawOpen") {
+        mesh.points.iter_mut().zip(&jaw.offsets).for_each(|(p, o)| *p -= options.lip_seal * *o);
+    }
+
     // Into head space: the origin is the joint between neck and skull, about which the head turns.
     let origin = joint(&mesh, landmarks::JOINT_HEAD);
     mesh.points.iter_mut().for_each(|p| *p = (*p - origin) * METRES_PER_DECIMETRE);
     shapes.iter_mut().flat_map(|s| &mut s.offsets).for_each(|o| *o *= METRES_PER_DECIMETRE);
 
     fit_blinks(&mesh, &mut shapes);
+    fit_teeth(&mut mesh);
     layout::split_body(&mut mesh);
     let bust = Bust::of(&mesh);
     let wanted: Vec<bool> =
@@ -170,6 +183,7 @@ fn check(options: &Options) -> Result<(), ImportError> {
         ("weight", options.weight),
         ("proportions", options.proportions),
         ("height", options.height),
+        ("lip_seal", options.lip_seal),
     ];
     for (name, value) in unit {
         if !(0.0..=1.0).contains(&value) {
@@ -204,6 +218,20 @@ fn fit_blinks(mesh: &PolyMesh, shapes: &mut [Shape]) {
             let scale = (gap / closing).clamp(0.5, 1.5);
             shape.offsets.iter_mut().for_each(|o| *o *= scale);
         }
+    }
+}
+
+/// Draws the teeth in: those of the base mesh show at the corners of closed lips.
+fn fit_teeth(mesh: &mut PolyMesh) {
+    let teeth = |g: &str| g == "helper-upper-teeth" || g == "helper-lower-teeth";
+    let points: BTreeSet<u32> = (0..mesh.face_count())
+        .filter(|f| teeth(&mesh.groups[mesh.face_groups[*f] as usize]))
+        .flat_map(|f| mesh.face(f))
+        .map(|c| c.point)
+        .collect();
+    for p in points {
+        let p = &mut mesh.points[p as usize];
+        *p = Vec3::new(0.92 * p.x, p.y, p.z - 0.001);
     }
 }
 

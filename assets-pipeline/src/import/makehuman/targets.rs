@@ -152,6 +152,8 @@ mod tests {
     fn macro_weights_of_each_family_sum_to_one() {
         let options = Options {
             ethnicity: [2.0, 1.0, 1.0],
+            targets: Vec::new(),
+            proportions: 0.5,
             gender: 0.3,
             age: 0.6,
             muscle: 0.7,

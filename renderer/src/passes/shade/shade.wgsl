@@ -238,7 +238,7 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
 }
 
 // The azimuthal coordinates of Material::Eye. Angles in radians.
-const IRIS_ANGLE = 0.50;
+const IRIS_ANGLE = 0.5146;
 const PUPIL_ANGLE = 0.17;
 const EYE_RADIUS_MM = 12.0;
 const IRIS_DEPTH_MM = 2.2;

@@ -1,0 +1,88 @@
+//! The default head from MakeHuman data. `RUBOR_MAKEHUMAN` names the folder with `mpfb2/` and `faceunits01/`.
+
+use std::collections::HashMap;
+
+use rubor_assets::import::makehuman::{Options, import};
+use rubor_rig::head::{Head, Material};
+use rubor_rig::landmarks::{MIDDLE, PAIRED, paired};
+
+fn head(subdivide: u32) -> Option<Head> {
+    let Ok(data) = std::env::var("RUBOR_MAKEHUMAN") else {
+        eprintln!("SKIPPED: RUBOR_MAKEHUMAN is not set, the default head was not built");
+        return None;
+    };
+    let options = Options { data: data.into(), subdivide, occlusion_rays: 8, ..Options::default() };
+    Some(import(&options).unwrap())
+}
+
+#[test]
+fn the_head_has_all_that_a_face_needs() {
+    let Some(head) = head(1) else { return };
+    assert_eq!(head.shapes.len(), 52);
+    assert!(head.shapes.iter().all(|s| !s.points.is_empty()));
+    for name in MIDDLE {
+        assert!(head.landmarks.contains_key(name), "{name}");
+        assert!(head.landmarks[name].x.abs() < 1e-4, "{name} is off the middle");
+    }
+    for name in PAIRED {
+        let (l, r) = (head.landmarks[&paired(name, true)], head.landmarks[&paired(name, false)]);
+        assert!(l.x > 0.0 && (l.x + r.x).abs() < 1e-3 && (l.y - r.y).abs() < 1e-3, "{name}: {l} {r}");
+    }
+    assert!((0.25..0.5).contains(&head.height()), "{} m", head.height());
+    assert!(head.mesh.occlusion.iter().all(|o| (0.0..=1.0).contains(o)));
+}
+
+#[test]
+fn skin_lies_inside_the_unit_square_without_overlap() {
+    let Some(head) = head(1) else { return };
+    let size = 1024;
+    let mut owner: HashMap<(i32, i32), u32> = HashMap::new();
+    let mut twice = 0;
+    for part in head.mesh.parts.iter().filter(|p| p.material == Material::Skin) {
+        for t in part.triangles.clone() {
+            let uv = head.mesh.triangles[t as usize].map(|v| head.mesh.vertices[v as usize].uv);
+            assert!(uv.iter().all(|p| p.min_element() > 0.0 && p.max_element() < 1.0));
+            let p = uv.map(|p| p * size as f32);
+            let low = p[0].min(p[1]).min(p[2]).floor().as_ivec2();
+            let high = p[0].max(p[1]).max(p[2]).ceil().as_ivec2();
+            for y in low.y..=high.y {
+                for x in low.x..=high.x {
+                    let q = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+                    let side = |a: usize, b: usize| (p[b] - p[a]).perp_dot(q - p[a]);
+                    let (a, b, c) = (side(0, 1), side(1, 2), side(2, 0));
+                    if (a > 0.0 && b > 0.0 && c > 0.0) || (a < 0.0 && b < 0.0 && c < 0.0) {
+                        twice += u32::from(owner.insert((x, y), t).is_some());
+                    }
+                }
+            }
+        }
+    }
+    let filled = owner.len() as f32 / (size * size) as f32;
+    assert!(filled > 0.5, "skin fills only {filled} of the square");
+    assert!(
+        (twice as f32) < 1e-3 * owner.len() as f32,
+        "{twice} of {} texels belong to two triangles",
+        owner.len()
+    );
+}
+
+#[test]
+fn the_same_data_gives_the_same_head() {
+    let (Some(a), Some(b)) = (head(0), head(0)) else { return };
+    assert_eq!(a.mesh, b.mesh);
+    assert_eq!(a.shapes, b.shapes);
+}
+
+#[test]
+fn missing_data_and_wrong_options_are_errors() {
+    let missing = import(&Options { data: "/nowhere".into(), ..Options::default() }).unwrap_err().to_string();
+    assert!(missing.contains("base.obj"), "{missing}");
+    for options in [
+        Options { gender: 1.5, ..Options::default() },
+        Options { age: f32::NAN, ..Options::default() },
+        Options { ethnicity: [0.0; 3], ..Options::default() },
+        Options { subdivide: 3, ..Options::default() },
+    ] {
+        assert!(import(&options).unwrap_err().to_string().contains("option"));
+    }
+}
