@@ -30,8 +30,8 @@ pub use environment::{Environment, EnvironmentMap};
 pub use error::RenderError;
 pub use frame::{FrameStats, Image, Renderer, Settings};
 pub use gpu::{AdapterDescription, Gpu, PassTimer, list_adapters};
-pub use passes::antialias;
 pub use head::{
     ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
 };
+pub use passes::antialias;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

@@ -111,10 +111,19 @@ impl<'a> Filter<'a> {
         let expected = bytes_per_row as usize * size[1] as usize;
         if texels.len() != expected {
             let mode = self.settings.mode.name();
-            return Err(AntialiasError::Inputs { mode, what: "bytes of pixels", expected, found: texels.len() });
+            return Err(AntialiasError::Inputs {
+                mode,
+                what: "bytes of pixels",
+                expected,
+                found: texels.len(),
+            });
         }
         let extent = wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 };
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(bytes_per_row), rows_per_image: None };
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(bytes_per_row),
+            rows_per_image: None,
+        };
         self.gpu.queue.write_texture(ready.input.as_image_copy(), texels, layout, extent);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let (color, output) =
@@ -127,12 +136,14 @@ impl<'a> Filter<'a> {
     }
 
     fn read(&self, texture: impl Fn(&Ready) -> &wgpu::Texture) -> Result<Vec<u8>, AntialiasError> {
-        let ready = self.ready.as_ref().ok_or_else(|| AntialiasError::Device("nothing was filtered".to_owned()))?;
+        let ready =
+            self.ready.as_ref().ok_or_else(|| AntialiasError::Device("nothing was filtered".to_owned()))?;
         self.gpu.read_texture(texture(ready)).map_err(device_error)
     }
 
     fn read_edges(&self) -> Result<Edges, AntialiasError> {
-        let ready = self.ready.as_ref().ok_or_else(|| AntialiasError::Device("nothing was filtered".to_owned()))?;
+        let ready =
+            self.ready.as_ref().ok_or_else(|| AntialiasError::Device("nothing was filtered".to_owned()))?;
         let bytes = self.gpu.read_buffer(&ready.pass.samples[0].bits).map_err(device_error)?;
         let words: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&bytes);
         let [width, height] = ready.size.map(|side| side as usize);

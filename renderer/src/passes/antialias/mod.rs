@@ -184,7 +184,8 @@ impl History {
     /// An empty history for images of `size` pixels.
     pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
         let usage = TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING;
-        let make = |format| gpu.target("antialias history", size, format, usage).create_view(&Default::default());
+        let make =
+            |format| gpu.target("antialias history", size, format, usage).create_view(&Default::default());
         Self {
             size,
             light: [make(TextureFormat::Rgba16Float), make(TextureFormat::Rgba16Float)],
@@ -238,7 +239,12 @@ impl Antialias {
     ///
     /// # Errors
     /// Settings out of range, a size or format that the device cannot take.
-    pub fn new(gpu: &Gpu, settings: &Settings, size: [u32; 2], output: TextureFormat) -> Result<Self, AntialiasError> {
+    pub fn new(
+        gpu: &Gpu,
+        settings: &Settings,
+        size: [u32; 2],
+        output: TextureFormat,
+    ) -> Result<Self, AntialiasError> {
         Self::with_dispatch(gpu, settings, size, output, Dispatch::default())
     }
 
@@ -257,7 +263,8 @@ impl Antialias {
         let [width, height] = size;
         let limits = gpu.device.limits();
         let words = [width.div_ceil(TILE), height.div_ceil(TILE)];
-        let bits_bytes = 8 * (u64::from(words[0]) * u64::from(height) + u64::from(words[1]) * u64::from(width));
+        let bits_bytes =
+            8 * (u64::from(words[0]) * u64::from(height) + u64::from(words[1]) * u64::from(width));
         // Tile coordinates are stored in 16 bits each.
         let limit = limits.max_texture_dimension_2d.min(1 << 20);
         if width == 0
@@ -308,7 +315,9 @@ impl Antialias {
             gpu.uniform("antialias params", &params)
         };
         let sampled_and_stored = TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING;
-        let texture = |label, size, format| gpu.target(label, size, format, sampled_and_stored | TextureUsages::COPY_SRC);
+        let texture = |label, size, format| {
+            gpu.target(label, size, format, sampled_and_stored | TextureUsages::COPY_SRC)
+        };
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
         let single = |format| view(&texture("antialias unused", [1, 1], format));
         Ok(Self {
@@ -435,7 +444,9 @@ impl Antialias {
             pass.set_bind_group(0, &group, &[]);
             match self.dispatch {
                 Dispatch::Tiles => pass.dispatch_workgroups_indirect(&sample.tiles, INDIRECT_OFFSET),
-                Dispatch::Screen => pass.dispatch_workgroups(self.size[0].div_ceil(8), self.size[1].div_ceil(8), 1),
+                Dispatch::Screen => {
+                    pass.dispatch_workgroups(self.size[0].div_ceil(8), self.size[1].div_ceil(8), 1)
+                }
             }
         }
         if self.by_tiles() {

@@ -79,7 +79,9 @@ fn feature(color: [f32; 4], settings: &Settings) -> [i32; 4] {
     let seen = match settings.edges {
         EdgeSource::Color => [r * cover, g * cover, b * cover, alpha],
         // Equation 9.2.
-        EdgeSource::Luma | EdgeSource::Depth => [(0.2126 * r + 0.7152 * g + 0.0722 * b) * cover, 0.0, 0.0, alpha],
+        EdgeSource::Luma | EdgeSource::Depth => {
+            [(0.2126 * r + 0.7152 * g + 0.0722 * b) * cover, 0.0, 0.0, alpha]
+        }
     };
     seen.map(|value| (value.clamp(0.0, BRIGHTEST) * STEPS).round_ties_even() as i32)
 }
@@ -215,7 +217,14 @@ fn unpack(area: u32) -> [f64; 2] {
 }
 
 /// Weights of the line of edges through the upper border of (x, y), sections 9.4 and 10.4.2.
-fn line_weights(lines: &Lines, x: isize, y: isize, block: usize, areas: &AreaTable, settings: &Settings) -> [f64; 2] {
+fn line_weights(
+    lines: &Lines,
+    x: isize,
+    y: isize,
+    block: usize,
+    areas: &AreaTable,
+    settings: &Settings,
+) -> [f64; 2] {
     let smaa = settings.mode != Mode::Mlaa;
     let (limit_left, limit_right) = search_limits(settings);
     let left = lines.distance(x, y, -1, limit_left, smaa);
@@ -231,7 +240,8 @@ fn line_weights(lines: &Lines, x: isize, y: isize, block: usize, areas: &AreaTab
         let (near, far) = (left <= right, right <= left);
         let share = if near && far { 0.5 } else { 1.0 };
         for (side, row) in [(0, y + 1), (1, y - 2)] {
-            let corners = usize::from(near && lines.crossing(first, row)) + usize::from(far && lines.crossing(after, row));
+            let corners = usize::from(near && lines.crossing(first, row))
+                + usize::from(far && lines.crossing(after, row));
             area[side] *= (1.0 - reduction * share * corners as f64).max(0.0);
         }
     }
@@ -239,14 +249,23 @@ fn line_weights(lines: &Lines, x: isize, y: isize, block: usize, areas: &AreaTab
 }
 
 /// Weights of the two diagonals through the upper border of (x, y), or zeros.
-fn diagonal_weights(edges: &Edges, x: isize, y: isize, blocks: [usize; 2], areas: &AreaTable, steps: u32) -> [f64; 2] {
+fn diagonal_weights(
+    edges: &Edges,
+    x: isize,
+    y: isize,
+    blocks: [usize; 2],
+    areas: &AreaTable,
+    steps: u32,
+) -> [f64; 2] {
     let upright = Lines { edges, turned: false };
     let top = |x: isize, y: isize| upright.line(x, y);
     let left = |x: isize, y: isize| upright.crossing(x, y);
     let lookup = |block: usize, near: u32, far: u32, distances: (u32, u32)| {
         let slot = DIAGONAL_SLOT as u32;
         let pattern = block as u32 * 16 + near + 4 * far;
-        unpack(areas.areas[(areas.diagonal_base + (pattern * slot + distances.0) * slot + distances.1) as usize])
+        unpack(
+            areas.areas[(areas.diagonal_base + (pattern * slot + distances.0) * slot + distances.1) as usize],
+        )
     };
     // Steps along which the stair goes on, whether its end was found, and the first bit of the last place looked at.
     let walk = |stair: &dyn Fn(isize) -> (bool, bool)| {
@@ -301,7 +320,12 @@ fn diagonal_weights(edges: &Edges, x: isize, y: isize, blocks: [usize; 2], areas
 const TIE: f64 = 1e-9;
 
 /// Blending weights of every pixel. `blocks` are places in `areas`, in the order of [`Subsample::blocks`].
-pub fn blending_weights(edges: &Edges, blocks: [usize; 4], areas: &AreaTable, settings: &Settings) -> Vec<Weights> {
+pub fn blending_weights(
+    edges: &Edges,
+    blocks: [usize; 4],
+    areas: &AreaTable,
+    settings: &Settings,
+) -> Vec<Weights> {
     let byte = |weight: f64| (weight.min(1.0) * 255.0 + 0.5 + TIE).floor() as u8;
     let (rows, columns) = (Lines { edges, turned: false }, Lines { edges, turned: true });
     let weights_at = |i: usize| -> Weights {
@@ -342,7 +366,11 @@ fn mix(parts: &[(f32, [f32; 4])], settings: &Settings) -> [f32; 4] {
             .iter()
             .map(|(share, color)| {
                 let value = if decode { linear_from_srgb(color[channel]) } else { color[channel] };
-                let share = if alpha > 0.0 && settings.alpha == Alpha::Straight { share * color[3] / alpha } else { *share };
+                let share = if alpha > 0.0 && settings.alpha == Alpha::Straight {
+                    share * color[3] / alpha
+                } else {
+                    *share
+                };
                 share * value
             })
             .sum();

@@ -40,14 +40,20 @@ fn hostile_pictures(width: usize, height: usize) -> Vec<(&'static str, Picture)>
     };
     vec![
         ("noise", Picture::from_fn(width, height, |_, _| [0, 1, 2, 3].map(|_| byte(noise.next())))),
-        ("binary noise", Picture::from_fn(width, height, |_, _| {
-            let v = noise.next().round();
-            [v, v, v, 1.0]
-        })),
-        ("sparse", Picture::from_fn(width, height, |_, _| {
-            let v = if noise.next() < 0.04 { 1.0 } else { 0.0 };
-            [v, 0.0, v, 1.0]
-        })),
+        (
+            "binary noise",
+            Picture::from_fn(width, height, |_, _| {
+                let v = noise.next().round();
+                [v, v, v, 1.0]
+            }),
+        ),
+        (
+            "sparse",
+            Picture::from_fn(width, height, |_, _| {
+                let v = if noise.next() < 0.04 { 1.0 } else { 0.0 };
+                [v, 0.0, v, 1.0]
+            }),
+        ),
         ("checker", Picture::from_fn(width, height, |x, y| [((x + y) % 2) as f32, 0.0, 0.0, 1.0])),
         ("flat stair", stair(0.07)),
         ("diagonal stair", stair(1.0)),
@@ -177,7 +183,8 @@ fn large_images_stay_inside_the_limits() {
     // Every tile of a long, thin image has edges.
     let mut filter = Filter::new(gpu, settings).unwrap();
     let width = 8192;
-    let picture = Picture::from_fn(width, 3, |x, y| if (x / 7 + y) % 2 == 0 { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] });
+    let picture =
+        Picture::from_fn(width, 3, |x, y| if (x / 7 + y) % 2 == 0 { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] });
     assert_close(&filter.picture(&picture).unwrap(), &reference_1x(&picture, &settings).2, 3e-5, "8192 x 3");
 }
 
@@ -200,7 +207,12 @@ fn sizes_settings_and_inputs_are_checked() {
     let short = Filter::new(gpu, settings).unwrap().bytes(2, 2, &[0; 15]);
     assert!(matches!(short, Err(AntialiasError::Inputs { expected: 16, found: 15, .. })), "{short:?}");
     let pass = Antialias::new(gpu, &temporal, [4, 4], TextureFormat::Rgba8Unorm).unwrap();
-    let view = gpu.target("t", [4, 4], TextureFormat::Rgba8Unorm, TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING);
+    let view = gpu.target(
+        "t",
+        [4, 4],
+        TextureFormat::Rgba8Unorm,
+        TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING,
+    );
     let view = view.create_view(&Default::default());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let inputs = Inputs { colors: &[&view], ..Default::default() };
@@ -226,7 +238,8 @@ fn depth_edges_and_predication() {
         Settings { predication: Some(Predication::default()), ..Settings::new(Mode::Smaa1x, Preset::High) },
     ] {
         let tables = Tables::new(&settings);
-        let expected = filter_sample(&picture, Some(&depth), &Mode::Smaa1x.subsamples(0)[0], &tables, &settings);
+        let expected =
+            filter_sample(&picture, Some(&depth), &Mode::Smaa1x.subsamples(0)[0], &tables, &settings);
         assert_ne!(expected, picture);
         let mut frames =
             Frames::new(gpu, settings, size.map(|s| s as u32), TextureFormat::Rgba32Float, Dispatch::Tiles);
@@ -247,9 +260,16 @@ struct Frames {
 }
 
 impl Frames {
-    fn new(gpu: &'static Gpu, settings: Settings, size: [u32; 2], format: TextureFormat, dispatch: Dispatch) -> Self {
+    fn new(
+        gpu: &'static Gpu,
+        settings: Settings,
+        size: [u32; 2],
+        format: TextureFormat,
+        dispatch: Dispatch,
+    ) -> Self {
         let pass = Antialias::with_dispatch(gpu, &settings, size, format, dispatch).unwrap();
-        let output = gpu.target("out", size, format, TextureUsages::STORAGE_BINDING | TextureUsages::COPY_SRC);
+        let output =
+            gpu.target("out", size, format, TextureUsages::STORAGE_BINDING | TextureUsages::COPY_SRC);
         Self { gpu, pass, size, format, output, history: History::new(gpu, size), frame: 0 }
     }
 
@@ -262,7 +282,12 @@ impl Frames {
         texture.create_view(&Default::default())
     }
 
-    fn run(&mut self, pictures: &[Picture], velocity_px: Option<&[[f32; 2]]>, depth: Option<&[f32]>) -> Picture {
+    fn run(
+        &mut self,
+        pictures: &[Picture],
+        velocity_px: Option<&[[f32; 2]]>,
+        depth: Option<&[f32]>,
+    ) -> Picture {
         let bytes = self.format == TextureFormat::Rgba8Unorm;
         let colors: Vec<TextureView> = pictures
             .iter()
@@ -275,7 +300,8 @@ impl Frames {
         let velocity = velocity_px.map(|v| self.upload(TextureFormat::Rg32Float, bytemuck::cast_slice(v)));
         let depth = depth.map(|d| self.upload(TextureFormat::R32Float, bytemuck::cast_slice(d)));
         let depths: Vec<&TextureView> = depth.iter().collect();
-        let inputs = Inputs { colors: &colors, depths: &depths, velocity: velocity.as_ref(), frame: self.frame };
+        let inputs =
+            Inputs { colors: &colors, depths: &depths, velocity: velocity.as_ref(), frame: self.frame };
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let output = self.output.create_view(&Default::default());
         let history = self.pass.settings().mode.is_temporal().then_some(&mut self.history);
@@ -311,7 +337,8 @@ fn pairs_of_samples_equal_the_reference() {
     let tables = Tables::new(&settings);
     let scene = disk(20.3, 17.1);
     let pictures = samples(&scene, size, Mode::SmaaS2x, 0);
-    let mut frames = Frames::new(gpu, settings, size.map(|s| s as u32), TextureFormat::Rgba32Float, Dispatch::Tiles);
+    let mut frames =
+        Frames::new(gpu, settings, size.map(|s| s as u32), TextureFormat::Rgba32Float, Dispatch::Tiles);
     let found = frames.run(&pictures, None, None);
     assert_close(&found, &filter_samples(&pictures, 0, &tables, &settings), 3e-5, "disk");
 }
@@ -327,8 +354,8 @@ fn still_images_take_half_of_the_previous_frame() {
         let tables = Tables::new(&settings);
         let mut frames =
             Frames::new(gpu, settings, size.map(|s| s as u32), TextureFormat::Rgba32Float, Dispatch::Tiles);
-        let reference =
-            [0, 1].map(|frame| filter_samples(&samples(&scene, size, mode, frame), frame, &tables, &settings));
+        let reference = [0, 1]
+            .map(|frame| filter_samples(&samples(&scene, size, mode, frame), frame, &tables, &settings));
         for frame in 0..4 {
             let found = frames.run(&samples(&scene, size, mode, frame), Some(&still), None);
             let expected = match frame {
@@ -492,8 +519,10 @@ fn rust_and_wgsl_agree_on_the_parameters() {
         for kernel in [Kernel::Edges, Kernel::Weights, Kernel::Blend, Kernel::Resolve] {
             for dispatch in [Dispatch::Tiles, Dispatch::Screen] {
                 let source = kernel.source(&Settings::new(mode, Preset::High), dispatch, "rgba8unorm");
-                let module = naga::front::wgsl::parse_str(&source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)));
-                let (_, params) = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Params")).unwrap();
+                let module = naga::front::wgsl::parse_str(&source)
+                    .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)));
+                let (_, params) =
+                    module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Params")).unwrap();
                 let naga::TypeInner::Struct { members, span } = &params.inner else { panic!("not a struct") };
                 let found: Vec<(&str, usize)> =
                     members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
@@ -518,7 +547,8 @@ fn rust_and_wgsl_agree_on_the_parameters() {
 #[test]
 fn settings_survive_json() {
     for mode in Mode::ALL {
-        let settings = Settings { predication: Some(Predication::default()), ..Settings::new(mode, Preset::Low) };
+        let settings =
+            Settings { predication: Some(Predication::default()), ..Settings::new(mode, Preset::Low) };
         let json = serde_json::to_string(&settings).unwrap();
         assert!(json.contains(mode.name()), "{json}");
         assert_eq!(serde_json::from_str::<Settings>(&json).unwrap(), settings);

@@ -16,7 +16,13 @@ type Point = (f64, f64);
 /// Steps go from (0, 0) to (`left + right + 1`) in both directions. A crossing edge fixes where the contour
 /// starts or ends: in the corner (1, 0) or (1, 1) of the stair's end pixel. Where both cross, or none, both
 /// contours are possible and their mean counts. An open end leaves the stair through (0, 0) or (1, 0).
-pub fn diagonal_area(near: Crossing, far: Crossing, left: usize, right: usize, offset: (f64, f64)) -> [f64; 2] {
+pub fn diagonal_area(
+    near: Crossing,
+    far: Crossing,
+    left: usize,
+    right: usize,
+    offset: (f64, f64),
+) -> [f64; 2] {
     const UPPER: Point = (1.0, 1.0);
     const LOWER: Point = (1.0, 0.0);
     const OUTER: Point = (0.0, 0.0);

@@ -66,7 +66,8 @@ pub fn area_texture() -> Vec<u8> {
         for (near, far) in all_crossings() {
             for right in 0..ORTHOGONAL_SLOT {
                 for left in 0..ORTHOGONAL_SLOT {
-                    let area = orthogonal_area(near, far, left * left, right * right, offset, Smoothing::Smaa);
+                    let area =
+                        orthogonal_area(near, far, left * left, right * right, offset, Smoothing::Smaa);
                     let slot_x = SLOT_OF_CROSSING[near as usize] * ORTHOGONAL_SLOT;
                     let slot_y = SLOT_OF_CROSSING[far as usize] * ORTHOGONAL_SLOT;
                     put(slot_x + left, slot_y + right, area);
@@ -130,7 +131,12 @@ impl AreaTable {
     ///
     /// # Panics
     /// When a block does not exist or `longest` is over 225, the last distance in the texture.
-    pub fn smaa(texture: &[u8], longest: usize, orthogonal_blocks: &[usize], diagonal_blocks: &[usize]) -> Self {
+    pub fn smaa(
+        texture: &[u8],
+        longest: usize,
+        orthogonal_blocks: &[usize],
+        diagonal_blocks: &[usize],
+    ) -> Self {
         let last = ORTHOGONAL_SLOT - 1;
         assert!(longest <= last * last, "the area texture ends at a distance of {} pixels", last * last);
         let stride = longest + 1;
@@ -141,7 +147,8 @@ impl AreaTable {
                 (fixed / 256, (fixed % 256) as u32)
             })
             .collect();
-        let texel = |x: usize, y: usize, channel: usize| u32::from(texture[(y * AREA_WIDTH + x) * 2 + channel]);
+        let texel =
+            |x: usize, y: usize, channel: usize| u32::from(texture[(y * AREA_WIDTH + x) * 2 + channel]);
         let mut areas = Vec::with_capacity((orthogonal_blocks.len() * stride * stride + 400) * 16);
         for &block in orthogonal_blocks {
             for pattern in 0..16 {
@@ -152,8 +159,10 @@ impl AreaTable {
                         let (x0, x1) = (slot_x + left, slot_x + (left + 1).min(last));
                         let (y0, y1) = (slot_y + right, slot_y + (right + 1).min(last));
                         let fetch = |channel| {
-                            let upper = texel(x0, y0, channel) * (256 - left_part) + texel(x1, y0, channel) * left_part;
-                            let lower = texel(x0, y1, channel) * (256 - left_part) + texel(x1, y1, channel) * left_part;
+                            let upper = texel(x0, y0, channel) * (256 - left_part)
+                                + texel(x1, y0, channel) * left_part;
+                            let lower = texel(x0, y1, channel) * (256 - left_part)
+                                + texel(x1, y1, channel) * left_part;
                             // 255 * 65536 times the fraction becomes 65535 times it: divide by 255 * 65536 / 65535.
                             let sum = upper * (256 - right_part) + lower * right_part;
                             ((u64::from(sum) * 257 + 32768) >> 16) as u32

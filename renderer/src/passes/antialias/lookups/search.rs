@@ -60,5 +60,7 @@ pub fn search_texture_uncropped() -> Vec<u8> {
 /// an edge ends a line.
 pub fn search_texture() -> Vec<u8> {
     let all = search_texture_uncropped();
-    (0..SEARCH_HEIGHT).flat_map(|y| all[(SIDE - 1 - y) * 2 * SIDE..][..SEARCH_WIDTH].iter().copied()).collect()
+    (0..SEARCH_HEIGHT)
+        .flat_map(|y| all[(SIDE - 1 - y) * 2 * SIDE..][..SEARCH_WIDTH].iter().copied())
+        .collect()
 }

@@ -19,7 +19,12 @@ fn assert_same_texels(made: &[u8], published: &[u8], width: usize, channels: usi
         .take(20)
         .map(|&i| ((i / channels) % width, i / channels / width, i % channels, made[i], published[i]))
         .collect();
-    assert!(wrong.is_empty(), "{} of {} bytes differ: (x, y, channel, made, published) {sample:?}", wrong.len(), made.len());
+    assert!(
+        wrong.is_empty(),
+        "{} of {} bytes differ: (x, y, channel, made, published) {sample:?}",
+        wrong.len(),
+        made.len()
+    );
 }
 
 #[test]
