@@ -1,19 +1,18 @@
 //! Conversions between what files hold and what heads hold.
-
-mod bvh;
-pub mod occlusion;
-//! Measured and painted maps into what a head needs.
 //!
 //! ```text
 //! hemoglobin maps --hemoglobin----> neutral map, its mean, scale and bias of every expression
 //! albedo texture  --chromophores--> melanin and hemoglobin maps, residual, out-of-gamut mask
 //! normal map      --normals-------> slopes, difference maps, and back
 //! another head    --transfer------> its distributions on this head's own blood
+//! rest mesh       --occlusion-----> ambient visibility of each point
 //! ```
 
+mod bvh;
 pub mod chromophores;
 pub mod hemoglobin;
 pub mod normals;
+pub mod occlusion;
 pub mod transfer;
 
 use rubor_rig::hemoglobin::HemoglobinError;
