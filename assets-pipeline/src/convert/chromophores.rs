@@ -1,7 +1,8 @@
 //! An albedo texture into melanin and hemoglobin by inverting the skin colour look-up.
 //!
 //! The projection is onto the colours that the two chromophores can make; what remains is kept as a residual map, and
-//! texels beyond a threshold (lips' make-up, brows, background, shading baked into a photograph) are marked.
+//! texels beyond a threshold (make-up, brows, stubble, background, shading baked into a photograph) are marked. These
+//! take their hemoglobin from the skin around them and the melanin that comes closest with it.
 
 use rayon::prelude::*;
 use rubor_rig::color::srgb_decode;
@@ -35,7 +36,7 @@ pub struct ChromophoreMaps {
     pub melanin: Map,
     /// Hemoglobin volume fraction, 1 channel, holes filled.
     pub hemoglobin: Map,
-    /// CIEDE2000 difference between albedo and model, 1 channel; 0 where unmapped.
+    /// CIEDE2000 difference between albedo and the nearest colour of the model, 1 channel; 0 where unmapped.
     pub residual: Map,
     /// Mapped texels whose residual is above the threshold.
     pub out_of_gamut: Mask,
@@ -136,6 +137,20 @@ pub fn convert(
     summary.mean_melanin /= mapped;
     summary.mean_hemoglobin /= mapped;
     summary.mean_residual_inside /= inside;
+    // What is no skin says nothing of blood: its hemoglobin comes from the skin around, its darkness is melanin's.
+    let mut skin = mask.clone();
+    for (s, out) in skin.mapped.iter_mut().zip(&out_of_gamut.mapped) {
+        *s &= !*out;
+    }
+    if skin.count() > 0 {
+        fill_unmapped(&mut hemoglobin, &skin);
+        melanin.values.par_iter_mut().enumerate().for_each(|(i, m)| {
+            if out_of_gamut.mapped[i] {
+                let c = &albedo_linear.values[3 * i..3 * i + 3];
+                *m = inverse.fit_melanin([c[0], c[1], c[2]], hemoglobin.values[i]).melanin;
+            }
+        });
+    }
     fill_unmapped(&mut melanin, mask);
     fill_unmapped(&mut hemoglobin, mask);
     Ok(ChromophoreMaps { melanin, hemoglobin, residual, out_of_gamut, summary })
