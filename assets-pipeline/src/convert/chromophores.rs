@@ -1,14 +1,15 @@
 //! An albedo texture into melanin and hemoglobin by inverting the skin colour look-up.
 //!
 //! The projection is onto the colours that the two chromophores can make; what remains is kept as a residual map, and
-//! texels beyond a threshold (lips' make-up, brows, background, shading baked into a photograph) are marked.
+//! texels beyond a threshold (make-up, brows, stubble, background, shading baked into a photograph) are marked. These
+//! take their hemoglobin from the skin around them and the melanin that comes closest with it.
 
 use rayon::prelude::*;
 use rubor_rig::color::srgb_decode;
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, fill_unmapped};
-use rubor_rig::skin::chromophores::SkinLookup;
 use rubor_rig::skin::chromophores::invert::{ChromophoreFit, SkinInverse};
+use rubor_rig::skin::chromophores::{MAX_HEMOGLOBIN, SkinLookup};
 use serde::Serialize;
 
 use super::ConvertError;
@@ -16,6 +17,10 @@ use crate::image_io::{LoadedImage, SampleKind};
 
 /// CIEDE2000 residual above which a texel counts as out of gamut unless asked otherwise: a clearly visible difference.
 pub const DEFAULT_GAMUT_THRESHOLD: f32 = 3.0;
+
+/// Share of the largest hemoglobin fraction above which a fit counts as stopped by the range. Half the range is 16 %
+/// blood, several times what flushed skin holds.
+const SATURATED: f32 = 0.5;
 
 /// Transfer function of an albedo file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,9 +40,9 @@ pub struct ChromophoreMaps {
     pub melanin: Map,
     /// Hemoglobin volume fraction, 1 channel, holes filled.
     pub hemoglobin: Map,
-    /// CIEDE2000 difference between albedo and model, 1 channel; 0 where unmapped.
+    /// CIEDE2000 difference between albedo and the nearest colour of the model, 1 channel; 0 where unmapped.
     pub residual: Map,
-    /// Mapped texels whose residual is above the threshold.
+    /// Mapped texels whose residual is above the threshold, or whose hemoglobin is beyond half the range.
     pub out_of_gamut: Mask,
     /// Numbers of the conversion.
     pub summary: ChromophoreSummary,
@@ -48,7 +53,7 @@ pub struct ChromophoreMaps {
 pub struct ChromophoreSummary {
     /// Texels that the mask keeps.
     pub mapped_texels: usize,
-    /// Texels above the threshold.
+    /// Texels marked as out of gamut.
     pub out_of_gamut_texels: usize,
     /// Mean CIEDE2000 residual of the texels inside the gamut.
     pub mean_residual_inside: f64,
@@ -117,7 +122,11 @@ pub fn convert(
     };
     let (mut melanin, mut hemoglobin) = (map(|f| f.melanin), map(|f| f.hemoglobin));
     let residual = map(|f| f.residual);
-    let out_of_gamut = Mask::above(&residual, 0, gamut_threshold);
+    // A fit that stops at the end of the range would go on: dark grey hair reads as blood without end.
+    let most = SATURATED * MAX_HEMOGLOBIN as f32;
+    let mapped =
+        fits.iter().map(|f| f.residual > gamut_threshold || f.hemoglobin > most).collect::<Vec<bool>>();
+    let out_of_gamut = Mask { width, height, mapped };
     let mut summary = ChromophoreSummary { mapped_texels: mask.count(), ..Default::default() };
     for ((fit, mapped), out) in fits.iter().zip(&mask.mapped).zip(&out_of_gamut.mapped) {
         if *mapped {
@@ -136,6 +145,20 @@ pub fn convert(
     summary.mean_melanin /= mapped;
     summary.mean_hemoglobin /= mapped;
     summary.mean_residual_inside /= inside;
+    // What is no skin says nothing of blood: its hemoglobin comes from the skin around, its darkness is melanin's.
+    let mut skin = mask.clone();
+    for (s, out) in skin.mapped.iter_mut().zip(&out_of_gamut.mapped) {
+        *s &= !*out;
+    }
+    if skin.count() > 0 {
+        fill_unmapped(&mut hemoglobin, &skin);
+        melanin.values.par_iter_mut().enumerate().for_each(|(i, m)| {
+            if out_of_gamut.mapped[i] {
+                let c = &albedo_linear.values[3 * i..3 * i + 3];
+                *m = inverse.fit_melanin([c[0], c[1], c[2]], hemoglobin.values[i]).melanin;
+            }
+        });
+    }
     fill_unmapped(&mut melanin, mask);
     fill_unmapped(&mut hemoglobin, mask);
     Ok(ChromophoreMaps { melanin, hemoglobin, residual, out_of_gamut, summary })

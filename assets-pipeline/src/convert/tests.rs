@@ -137,6 +137,8 @@ fn texels_that_are_no_skin_are_marked_and_holes_filled() {
     let found = chromophores::convert(&albedo, &mask, &lookup, 3.0).unwrap();
     assert_eq!(found.out_of_gamut.count(), 1);
     assert!(found.out_of_gamut.mapped[9] && found.residual.values[9] > 20.0);
+    // The marked texel has the blood of the skin around it.
+    assert!((found.hemoglobin.values[9] - 0.015).abs() < 1e-3, "{}", found.hemoglobin.values[9]);
     assert!((found.melanin.values[0] - 0.02).abs() < 0.02, "{}", found.melanin.values[0]);
     assert!((found.melanin.values[20] - 0.02).abs() < 1e-4);
     assert!(chromophores::convert(&albedo, &Mask::full(3, 3), &lookup, 3.0).is_err());
