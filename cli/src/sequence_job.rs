@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
-use rubor_renderer::{Gpu, Image, Renderer, Settings};
+use rubor_renderer::{Gpu, Image, Renderer, Settings, antialias};
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{Head, Material};
@@ -45,8 +45,8 @@ pub(crate) struct Arguments {
     /// Subsurface scattering: none, or separable:N with an odd N from 5 to 65
     #[arg(long, default_value = "separable:17", value_parser = parse_scatter, value_name = "METHOD")]
     pub(crate) scatter: Scatter,
-    /// Antialiasing: none, or ssaa:N with N x N samples a pixel
-    #[arg(long, default_value = "ssaa:2", value_parser = parse_antialias, value_name = "METHOD")]
+    /// Antialiasing: none, mlaa, smaa-1x, smaa-s2x, smaa-t2x, smaa-4x, or ssaa:N with N x N samples a pixel
+    #[arg(long, default_value = "smaa-s2x", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
     /// Factor of the light before the tone map
     #[arg(long, default_value_t = 1.8)]
@@ -81,7 +81,7 @@ pub(crate) enum Scatter {
 /// An antialiasing method by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Antialias {
-    None,
+    Filter(antialias::Mode),
     Supersampling(u32),
 }
 
@@ -116,12 +116,15 @@ fn parse_scatter(text: &str) -> Result<Scatter, String> {
 }
 
 fn parse_antialias(text: &str) -> Result<Antialias, String> {
-    if text == "none" {
-        return Ok(Antialias::None);
+    if let Some(mode) = antialias::Mode::ALL.into_iter().find(|mode| mode.name() == text) {
+        return Ok(Antialias::Filter(mode));
     }
     match text.strip_prefix("ssaa:").and_then(|n| n.parse().ok()) {
         Some(n) if (1..=8).contains(&n) => Ok(Antialias::Supersampling(n)),
-        _ => Err(format!("found {text:?}, expected none, or ssaa:N with N from 1 to 8")),
+        _ => {
+            let names = antialias::Mode::ALL.map(antialias::Mode::name).join(", ");
+            Err(format!("found {text:?}, expected {names}, or ssaa:N with N from 1 to 8"))
+        }
     }
 }
 
@@ -172,6 +175,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     let mut times = PassTimes::default();
     let mut first_frame_s = None;
     let mut drawn = Vec::new();
+    let mut drawn_last = None;
     let mut progress = Progress::new("frames", frames.len() as u64);
     for (place, frame) in frames.iter().copied().enumerate() {
         let path = frame_path(&arguments.output, frame);
@@ -180,9 +184,13 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
             Some(picture) => picture,
             None => {
                 let at = Instant::now();
-                let mut shots: Vec<Shot> = evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
-                step_back(&mut shots);
-                let (image, stats) = studio.render(&shots, spacing, &settings)?;
+                if settings.antialias.mode.is_temporal() && frame > 0 && drawn_last != Some(frame - 1) {
+                    // Frames were left out: antialiasing over time needs the one before.
+                    studio.renderer.cut(u64::from(frame) - 1);
+                    studio.render(&shots_of(&evaluators, frame - 1), spacing, &settings)?;
+                }
+                drawn_last = Some(frame);
+                let (image, stats) = studio.render(&shots_of(&evaluators, frame), spacing, &settings)?;
                 let picture = opaque(image);
                 write_png(&path, &picture)?;
                 first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
@@ -248,11 +256,18 @@ fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
         Scatter::None => None,
         Scatter::Separable(n) => Some(SeparableKernel::of(&Profile::deon_six(), n).map_err(Failure::input)?),
     };
-    let supersampling = match arguments.antialias {
-        Antialias::None => 1,
-        Antialias::Supersampling(n) => n,
+    let (mode, supersampling) = match arguments.antialias {
+        Antialias::Filter(mode) => (mode, 1),
+        Antialias::Supersampling(n) => (antialias::Mode::None, n),
     };
-    Ok(Settings { size, scatter, supersampling, shadow_size: 2048, exposure: arguments.exposure })
+    Ok(Settings {
+        size,
+        scatter,
+        antialias: antialias::Settings::new(mode, antialias::Preset::High),
+        supersampling,
+        shadow_size: 2048,
+        exposure: arguments.exposure,
+    })
 }
 
 /// Writes down what job the folder holds. False where a stopped run of the same job goes on.
@@ -311,15 +326,14 @@ fn width(head: &Head) -> f32 {
     head.bounds().map_or(0.0, |(low, high)| high.x - low.x)
 }
 
-/// Several heads side by side are seen from further away.
-fn step_back(shots: &mut [Shot]) {
+/// Shots of all heads at a frame, from the camera of the first; several heads are seen from further away.
+fn shots_of(evaluators: &[Evaluator], frame: u32) -> Vec<Shot> {
+    let mut shots: Vec<Shot> = evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
     let n = shots.len() as f32;
-    if let Some(first) = shots.first_mut()
-        && n > 1.0
-    {
-        let camera = &mut first.camera;
+    if let Some(Shot { camera, .. }) = shots.first_mut() {
         camera.position = camera.target + (camera.position - camera.target) * n;
     }
+    shots
 }
 
 /// Writes the (first) head with its performance as morph weights and node motion.
