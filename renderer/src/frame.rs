@@ -76,6 +76,8 @@ pub(crate) struct View {
     pub(crate) jitter: [f32; 2],
     pub(crate) near: f32,
     pub(crate) light_count: u32,
+    pub(crate) shading_jitter: [f32; 2],
+    pub(crate) padding: [f32; 2],
 }
 
 /// Draws scenes. Keeps pipelines, and images of the last size, between frames; nothing else carries over.
@@ -429,11 +431,15 @@ impl Renderer {
         let shadows = crate::texture::array_view_of(&targets.shadows);
 
         let subsamples = settings.antialias.mode.subsamples(self.past.frames);
+        let share = 1.0 / subsamples.len() as f32;
+        let shading_jitter = subsamples
+            .iter()
+            .fold([0.0; 2], |sum, s| [sum[0] - share * s.position_px[0], sum[1] - share * s.position_px[1]]);
         for (sample, subsample) in targets.samples.iter().zip(subsamples) {
             let first = &targets.samples[0];
             // A camera reaches a place in the pixel by moving the image the other way.
             let jitter = subsample.position_px.map(|p| -p);
-            let view = view(scene, targets.size, jitter, self.past.clip_from_world);
+            let view = view(scene, targets.size, [jitter, shading_jitter], self.past.clip_from_world);
             let view = gpu.uniform("view", &view);
             self.visibility.record(gpu, encoder, timer, &view, &drawn, &sample.ids, &sample.depth);
 
@@ -529,7 +535,12 @@ impl Renderer {
     }
 }
 
-fn view(scene: &Scene<'_>, size: [u32; 2], jitter: [f32; 2], previous: Option<Mat4>) -> View {
+fn view(
+    scene: &Scene<'_>,
+    size: [u32; 2],
+    [jitter, shading_jitter]: [[f32; 2]; 2],
+    previous: Option<Mat4>,
+) -> View {
     let camera = &scene.camera;
     let aspect = size[0] as f32 / size[1] as f32;
     let view_from_world = camera.view_from_world();
@@ -550,6 +561,8 @@ fn view(scene: &Scene<'_>, size: [u32; 2], jitter: [f32; 2], previous: Option<Ma
         jitter,
         near: NEAR_METRES,
         light_count: scene.lights.len() as u32,
+        shading_jitter,
+        padding: [0.0; 2],
     }
 }
 

@@ -174,10 +174,10 @@ fn surface_at(pixel: vec2f, corners: vec4u) -> Surface {
     let a = positions[vertex[0].point].xyz - view.origin.xyz;
     let b = positions[vertex[1].point].xyz - view.origin.xyz;
     let c = positions[vertex[2].point].xyz - view.origin.xyz;
-    let here = ray_barycentrics(a, b, c, pixel_ray(view, pixel));
+    let here = ray_barycentrics(a, b, c, pixel_ray(view, pixel, view.shading_jitter));
     // The same triangle one pixel to the right and one down: texture gradients without neighbours.
-    let right = ray_barycentrics(a, b, c, pixel_ray(view, pixel + vec2f(1.0, 0.0)));
-    let down = ray_barycentrics(a, b, c, pixel_ray(view, pixel + vec2f(0.0, 1.0)));
+    let right = ray_barycentrics(a, b, c, pixel_ray(view, pixel + vec2f(1.0, 0.0), view.shading_jitter));
+    let down = ray_barycentrics(a, b, c, pixel_ray(view, pixel + vec2f(0.0, 1.0), view.shading_jitter));
     let us = vec3f(vertex[0].u, vertex[1].u, vertex[2].u);
     let vs = vec3f(vertex[0].v, vertex[1].v, vertex[2].v);
     let uv = vec2f(dot(here, us), dot(here, vs));

@@ -39,7 +39,7 @@ fn velocity_main(@builtin(global_invocation_id) id: vec3u) {
         positions[points.x].xyz - origin,
         positions[points.y].xyz - origin,
         positions[points.z].xyz - origin,
-        pixel_ray(view, vec2f(id.xy) + 0.5),
+        pixel_ray(view, vec2f(id.xy) + 0.5, view.jitter),
     );
     let now = b.x * positions[points.x].xyz + b.y * positions[points.y].xyz + b.z * positions[points.z].xyz;
     let before = b.x * previous_positions[points.x].xyz
