@@ -8,7 +8,7 @@
 
 use rubor_renderer::{Gpu, PassTimer};
 use rubor_renderer::antialias::{
-    Antialias, BlendSpace, Dispatch, History, Inputs, Mode, Preset, Settings,
+    Antialias, BlendSpace, DiagonalEdges, Dispatch, History, Inputs, Mode, Preset, Settings,
 };
 use std::time::Instant;
 use wgpu::{TextureFormat, TextureUsages};
@@ -113,8 +113,11 @@ impl Bench {
     }
 
     fn ours(&self, gpu: &Gpu) -> Result<Vec<u8>> {
-        let settings =
-            Settings { blend_space: BlendSpace::Stored, ..Settings::new(Mode::Smaa1x, Preset::High) };
+        let settings = Settings {
+            blend_space: BlendSpace::Stored,
+            diagonal_edges: DiagonalEdges::Published,
+            ..Settings::new(Mode::Smaa1x, Preset::High)
+        };
         let pass = Antialias::new(gpu, &settings, self.size, FORMAT)?;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let input = Self::view(&self.input);
