@@ -212,7 +212,7 @@ impl AreaTable {
                     let x = SLOT_OF_CROSSING[pattern & 3] * MLAA_SLOT + left;
                     let y = SLOT_OF_CROSSING[pattern >> 2] * MLAA_SLOT + right;
                     let at = (y * 5 * MLAA_SLOT + x) * 2;
-                    areas.push(u32::from(texture[at]) * 257 | ((u32::from(texture[at + 1]) * 257) << 16));
+                    areas.push((u32::from(texture[at]) * 257) | ((u32::from(texture[at + 1]) * 257) << 16));
                 }
             }
         }
