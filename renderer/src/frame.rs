@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
 use crate::head::HeadOnGpu;
+use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::{Appearance, Blended};
 use crate::passes::compose::Compose;
 use crate::passes::display::Display;
@@ -16,6 +17,7 @@ use crate::passes::scatter::Scatter;
 use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded};
 use crate::passes::shadow::{LightView, Shadow};
 use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
+use crate::passes::velocity::{Moving, Velocity};
 use crate::passes::visibility::Visibility;
 use crate::scene::{Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
 
@@ -26,6 +28,8 @@ pub struct Settings {
     pub size: [u32; 2],
     /// Scattering kernel; without one light does not scatter.
     pub scatter: Option<SeparableKernel>,
+    /// Antialiasing of the displayed image.
+    pub antialias: antialias::Settings,
     /// Pixels of the frame on a side of a pixel of the image (1 to 8): `ssaa`.
     pub supersampling: u32,
     /// Texels on a side of a shadow map.
@@ -41,7 +45,7 @@ pub struct Image {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// RGBA, sRGB transfer; alpha is coverage (not premultiplied).
+    /// RGBA, sRGB transfer, opaque.
     pub rgba: Vec<u8>,
 }
 
@@ -87,47 +91,80 @@ pub struct Renderer {
     compose: Compose,
     overlay: Overlay,
     display: Display,
+    velocity: Velocity,
+    antialias: Option<Antialias>,
     targets: Option<Targets>,
     instances: Vec<Instance>,
     timer: PassTimer,
+    /// What antialiasing over time remembers: the only thing that one frame leaves to the next.
+    past: Past,
+}
+
+/// The previous frame.
+#[derive(Default)]
+struct Past {
+    history: Option<History>,
+    clip_from_world: Option<Mat4>,
+    frames: u64,
 }
 
 /// Images between passes.
 struct Targets {
     size: [u32; 2],
-    ids: wgpu::TextureView,
-    depth: wgpu::TextureView,
+    samples: Vec<SampleTargets>,
+    velocity: Option<wgpu::TextureView>,
+    image: wgpu::Texture,
     irradiance: wgpu::TextureView,
     albedo: wgpu::TextureView,
     direct: wgpu::TextureView,
     scratch: wgpu::TextureView,
     scattered: wgpu::TextureView,
     hdr: wgpu::TextureView,
-    image: wgpu::Texture,
     shadows: wgpu::Texture,
+}
+
+/// Images of one sample of each pixel.
+struct SampleTargets {
+    ids: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    /// Encoded for display, before antialiasing.
+    displayed: wgpu::TextureView,
 }
 
 /// Buffers of one head of a scene.
 struct Instance {
     positions: wgpu::Buffer,
+    previous_positions: wgpu::Buffer,
     frames: wgpu::Buffer,
     blended: Blended,
 }
 
 impl Targets {
-    fn new(gpu: &Gpu, size: [u32; 2], image_size: [u32; 2], shadow_size: u32, shadow_layers: u32) -> Self {
+    fn new(gpu: &Gpu, settings: &Settings, shadow_layers: u32) -> Self {
         use wgpu::TextureFormat::{Depth32Float, R32Uint, Rgba8Unorm, Rgba16Float};
         use wgpu::TextureUsages as Use;
-        let view = |label, format, usage| {
+        let size = settings.frame_size();
+        let storage = Use::STORAGE_BINDING;
+        let view = |label, size, format, usage| {
             gpu.target(label, size, format, usage | Use::TEXTURE_BINDING | Use::COPY_SRC)
                 .create_view(&Default::default())
         };
-        let storage = Use::STORAGE_BINDING;
+        let light = |label| view(label, size, Rgba16Float, storage);
+        let mode = settings.antialias.mode;
+        let samples = mode
+            .subsamples(0)
+            .iter()
+            .map(|_| SampleTargets {
+                ids: view("ids", size, R32Uint, Use::RENDER_ATTACHMENT),
+                depth: view("depth", size, Depth32Float, Use::RENDER_ATTACHMENT),
+                displayed: view("displayed", settings.size, Rgba8Unorm, storage),
+            })
+            .collect();
         let shadows = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("shadows"),
             size: wgpu::Extent3d {
-                width: shadow_size,
-                height: shadow_size,
+                width: settings.shadow_size,
+                height: settings.shadow_size,
                 depth_or_array_layers: shadow_layers.max(1),
             },
             mip_level_count: 1,
@@ -139,28 +176,30 @@ impl Targets {
         });
         Self {
             size,
-            ids: view("ids", R32Uint, Use::RENDER_ATTACHMENT),
-            depth: view("depth", Depth32Float, Use::RENDER_ATTACHMENT),
-            irradiance: view("irradiance", Rgba16Float, storage),
-            albedo: view("albedo", Rgba16Float, storage),
-            direct: view("direct", Rgba16Float, storage),
-            scratch: view("scratch", Rgba16Float, storage),
-            scattered: view("scattered", Rgba16Float, storage),
-            hdr: view("hdr", Rgba16Float, storage | Use::RENDER_ATTACHMENT),
+            samples,
+            velocity: mode.is_temporal().then(|| light("velocity")),
             image: gpu.target(
                 "image",
-                image_size,
+                settings.size,
                 Rgba8Unorm,
                 storage | Use::COPY_SRC | Use::TEXTURE_BINDING,
             ),
+            irradiance: light("irradiance"),
+            albedo: light("albedo"),
+            direct: light("direct"),
+            scratch: light("scratch"),
+            scattered: light("scattered"),
+            hdr: view("hdr", size, Rgba16Float, storage | Use::RENDER_ATTACHMENT),
             shadows,
         }
     }
 
     fn matches(&self, settings: &Settings, shadow_layers: u32) -> bool {
-        let image = [self.image.width(), self.image.height()];
-        self.size == settings.size.map(|n| n * settings.supersampling)
-            && image == settings.size
+        let mode = settings.antialias.mode;
+        self.size == settings.frame_size()
+            && [self.image.width(), self.image.height()] == settings.size
+            && self.samples.len() == mode.subsamples(0).len()
+            && self.velocity.is_some() == mode.is_temporal()
             && self.shadows.width() == settings.shadow_size
             && self.shadows.depth_or_array_layers() >= shadow_layers
     }
@@ -168,9 +207,18 @@ impl Targets {
     fn bytes(&self) -> u64 {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let image = u64::from(self.image.width()) * u64::from(self.image.height()) * 4;
+        let samples = self.samples.len() as u64;
         let s = self.shadows.size();
         let shadow = u64::from(s.width) * u64::from(s.height) * u64::from(s.depth_or_array_layers) * 4;
-        pixels * (4 + 4 + 6 * 8) + image + shadow
+        let lights = 6 + u64::from(self.velocity.is_some());
+        pixels * (samples * 8 + lights * 8) + image * (1 + samples) + shadow
+    }
+}
+
+impl Settings {
+    /// Pixels that the passes before display draw.
+    fn frame_size(&self) -> [u32; 2] {
+        self.size.map(|n| n * self.supersampling)
     }
 }
 
@@ -191,9 +239,12 @@ impl Renderer {
             compose: Compose::new(&gpu),
             overlay: Overlay::new(&gpu),
             display: Display::new(&gpu),
+            velocity: Velocity::new(&gpu),
+            antialias: None,
             targets: None,
             instances: Vec::new(),
             timer: PassTimer::new(&gpu),
+            past: Past::default(),
             gpu,
         };
         renderer.gpu.check()?;
@@ -205,7 +256,13 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Draws a scene and waits for the picture.
+    /// Forgets the previous frame: call it at a cut, so that antialiasing over time mixes nothing into the next one.
+    /// `frame` is the number of the next frame: even and odd ones have their samples at other places.
+    pub fn cut(&mut self, frame: u64) {
+        self.past = Past { frames: frame, ..Past::default() };
+    }
+
+    /// Draws a scene and waits for the picture. Frames follow one another until [`Renderer::cut`].
     ///
     /// # Errors
     /// A size, a count or a value outside the limits; the device failed.
@@ -217,24 +274,32 @@ impl Renderer {
         self.check(scene, settings)?;
         let shadow_layers = scene.lights.iter().filter(|l| l.casts_shadow).count() as u32;
         if !self.targets.as_ref().is_some_and(|t| t.matches(settings, shadow_layers)) {
-            let size = settings.size.map(|n| n * settings.supersampling);
-            self.targets =
-                Some(Targets::new(&self.gpu, size, settings.size, settings.shadow_size, shadow_layers));
+            self.targets = Some(Targets::new(&self.gpu, settings, shadow_layers));
+            self.antialias = None;
+            self.past = Past { frames: self.past.frames, ..Past::default() };
+        }
+        if settings.antialias.mode == antialias::Mode::None {
+            self.antialias = None;
+        } else if self.antialias.as_ref().is_none_or(|a| *a.settings() != settings.antialias) {
+            let format = wgpu::TextureFormat::Rgba8Unorm;
+            self.antialias = Some(Antialias::new(&self.gpu, &settings.antialias, settings.size, format)?);
         }
         self.fit_instances(scene);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        self.record_frame(&mut encoder, scene, settings);
+        self.record_frame(&mut encoder, scene, settings)?;
         self.gpu.queue.submit([encoder.finish()]);
         let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
-        let rgba = self.gpu.read_texture(&targets.image)?;
+        let image =
+            if self.antialias.is_some() { &targets.image } else { targets.samples[0].displayed.texture() };
+        let rgba = self.gpu.read_texture(image)?;
+        let heads = scene.heads.iter().map(|h| h.head);
         let stats = FrameStats {
             passes_ms: self.timer.read(&self.gpu)?,
-            triangles: scene
-                .heads
-                .iter()
-                .map(|h| u64::from(h.head.opaque_triangles + h.head.overlay_triangles))
-                .sum(),
-            memory_bytes: targets.bytes() + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>(),
+            triangles: heads.clone().map(|h| u64::from(h.opaque_triangles + h.overlay_triangles)).sum(),
+            memory_bytes: targets.bytes()
+                + self.antialias.as_ref().map_or(0, Antialias::memory_bytes)
+                + self.past.history.as_ref().map_or(0, History::memory_bytes)
+                + heads.map(|h| h.memory_bytes).sum::<u64>(),
         };
         Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
     }
@@ -321,20 +386,26 @@ impl Renderer {
             }
             let instance = Instance {
                 positions: gpu.storage_zeroed("positions", points),
+                previous_positions: gpu.storage_zeroed("previous positions", points),
                 frames: gpu.storage_zeroed("surface frames", frames),
                 blended: Blended::new(gpu),
             };
             self.instances.truncate(i);
             self.instances.push(instance);
+            self.past = Past { frames: self.past.frames, ..Past::default() };
         }
     }
 
     /// Every pass of a frame, in order.
-    fn record_frame(&mut self, encoder: &mut wgpu::CommandEncoder, scene: &Scene<'_>, settings: &Settings) {
+    fn record_frame(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+    ) -> Result<(), RenderError> {
         let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let Some(targets) = &self.targets else { return };
+        let Some(targets) = &self.targets else { return Ok(()) };
         timer.restart();
-        let view = gpu.uniform("view", &view(scene, targets.size));
         let heads: Vec<(&HeadOnGpu, &Instance)> =
             scene.heads.iter().map(|h| h.head).zip(&self.instances).collect();
         let drawn: Vec<_> = heads.iter().map(|(h, i)| (*h, &i.positions)).collect();
@@ -346,15 +417,8 @@ impl Renderer {
             self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
             if let Some(maps) = &head.maps {
                 let state = instance.state;
-                self.appearance.record(
-                    gpu,
-                    encoder,
-                    timer,
-                    maps,
-                    &state.distributions,
-                    &state.zones,
-                    &buffers.blended,
-                );
+                let (distributions, zones) = (&state.distributions, &state.zones);
+                self.appearance.record(gpu, encoder, timer, maps, distributions, zones, &buffers.blended);
             }
         }
 
@@ -362,61 +426,110 @@ impl Renderer {
         for (light, layer) in &layers {
             self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
         }
-        self.visibility.record(gpu, encoder, timer, &view, &drawn, &targets.ids, &targets.depth);
+        let shadows = crate::texture::array_view_of(&targets.shadows);
 
-        let shadows = targets.shadows.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            ..Default::default()
-        });
-        let lighting = Lighting {
-            view: &view,
-            lights,
-            shadows: &shadows,
-            environment: scene.environment,
-            environment_intensity: scene.environment_intensity,
-            ids: &targets.ids,
-        };
-        let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
-        for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
-            let shaded = Shaded {
-                index: index as u32,
-                head,
-                positions: &buffers.positions,
-                frames: &buffers.frames,
-                blended: &buffers.blended,
-                hemoglobin_scale: instance.state.hemoglobin_scale,
+        let subsamples = settings.antialias.mode.subsamples(self.past.frames);
+        for (sample, subsample) in targets.samples.iter().zip(subsamples) {
+            let first = &targets.samples[0];
+            // A camera reaches a place in the pixel by moving the image the other way.
+            let jitter = subsample.position_px.map(|p| -p);
+            let view = view(scene, targets.size, jitter, self.past.clip_from_world);
+            let view = gpu.uniform("view", &view);
+            self.visibility.record(gpu, encoder, timer, &view, &drawn, &sample.ids, &sample.depth);
+
+            let lighting = Lighting {
+                view: &view,
+                lights,
+                shadows: &shadows,
+                environment: scene.environment,
+                environment_intensity: scene.environment_intensity,
+                ids: &sample.ids,
+                depth: &sample.depth,
+                first: (!std::ptr::eq(sample, first)).then_some((&first.ids, &first.depth)),
             };
-            self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
+            let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
+            for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
+                let shaded = Shaded {
+                    index: index as u32,
+                    head,
+                    positions: &buffers.positions,
+                    frames: &buffers.frames,
+                    blended: &buffers.blended,
+                    hemoglobin_scale: instance.state.hemoglobin_scale,
+                };
+                self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
+            }
+
+            let mut diffuse = &targets.irradiance;
+            if let Some(kernel) = &settings.scatter {
+                let images = [&targets.irradiance, &targets.scratch, &targets.scattered];
+                self.scatter.record(gpu, encoder, timer, &view, kernel, &sample.depth, images);
+                diffuse = &targets.scattered;
+            }
+
+            let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
+            self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
+            let overlays: Vec<_> = heads
+                .iter()
+                .filter(|(h, _)| h.overlay_triangles > 0)
+                .map(|(h, i)| (*h, &i.positions, &i.frames))
+                .collect();
+            if !overlays.is_empty() {
+                let ambient = average_light(scene);
+                let images = [&sample.depth, &targets.hdr];
+                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
+            }
+
+            let (exposure, samples) = (settings.exposure, settings.supersampling);
+            self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
+            if let Some(velocity) = targets.velocity.as_ref().filter(|_| std::ptr::eq(sample, first)) {
+                // The first frame has nothing before it: its positions stand for the previous ones.
+                let known = self.past.clip_from_world.is_some();
+                let moving: Vec<_> = heads
+                    .iter()
+                    .map(|(head, i)| Moving {
+                        head,
+                        positions: &i.positions,
+                        previous_positions: if known { &i.previous_positions } else { &i.positions },
+                    })
+                    .collect();
+                self.velocity.record(gpu, encoder, timer, &view, &moving, &sample.ids, velocity);
+            }
         }
 
-        let mut diffuse = &targets.irradiance;
-        if let Some(kernel) = &settings.scatter {
-            let images = [&targets.irradiance, &targets.scratch, &targets.scattered];
-            self.scatter.record(gpu, encoder, timer, &view, kernel, &targets.depth, images);
-            diffuse = &targets.scattered;
+        if let Some(antialias) = &self.antialias {
+            let colors: Vec<_> = targets.samples.iter().map(|s| &s.displayed).collect();
+            let depths: Vec<_> = targets.samples.iter().map(|s| &s.depth).collect();
+            let inputs = antialias::Inputs {
+                colors: &colors,
+                depths: if settings.antialias.needs_depth() { &depths } else { &[] },
+                velocity: targets.velocity.as_ref(),
+                frame: self.past.frames,
+            };
+            let image = targets.image.create_view(&Default::default());
+            let is_temporal = settings.antialias.mode.is_temporal();
+            if is_temporal && self.past.history.is_none() {
+                self.past.history = Some(History::new(gpu, settings.size));
+            }
+            let history = if is_temporal { self.past.history.as_mut() } else { None };
+            antialias.record(gpu, encoder, timer, &inputs, &image, history)?;
+            if is_temporal {
+                for (_, buffers) in &heads {
+                    let (from, to) = (&buffers.positions, &buffers.previous_positions);
+                    encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+                }
+                let aspect = targets.size[0] as f32 / targets.size[1] as f32;
+                let camera = &scene.camera;
+                self.past.clip_from_world = Some(camera.clip_from_view(aspect) * camera.view_from_world());
+                self.past.frames += 1;
+            }
         }
-
-        let inputs = [diffuse, &targets.albedo, &targets.direct, &targets.depth];
-        self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
-        let overlays: Vec<_> = heads
-            .iter()
-            .filter(|(h, _)| h.overlay_triangles > 0)
-            .map(|(h, i)| (*h, &i.positions, &i.frames))
-            .collect();
-        if !overlays.is_empty() {
-            let ambient = average_light(scene);
-            let images = [&targets.depth, &targets.hdr];
-            self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
-        }
-
-        let image = targets.image.create_view(&Default::default());
-        let samples = settings.supersampling;
-        self.display.record(gpu, encoder, timer, settings.exposure, samples, &targets.hdr, &image);
         timer.resolve(encoder);
+        Ok(())
     }
 }
 
-fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
+fn view(scene: &Scene<'_>, size: [u32; 2], jitter: [f32; 2], previous: Option<Mat4>) -> View {
     let camera = &scene.camera;
     let aspect = size[0] as f32 / size[1] as f32;
     let view_from_world = camera.view_from_world();
@@ -426,7 +539,7 @@ fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
     let clip_from_world = camera.clip_from_view(aspect) * view_from_world;
     View {
         clip_from_world,
-        previous_clip_from_world: clip_from_world,
+        previous_clip_from_world: previous.unwrap_or(clip_from_world),
         origin: camera.position.extend(size[1] as f32 / (2.0 * tangent)).to_array(),
         right: axis(Vec3::X * tangent * aspect),
         up: axis(Vec3::Y * tangent),
@@ -434,7 +547,7 @@ fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
         size,
         head_count: scene.heads.len() as u32,
         has_environment: u32::from(scene.environment.is_some()),
-        jitter: [0.0; 2],
+        jitter,
         near: NEAR_METRES,
         light_count: scene.lights.len() as u32,
     }

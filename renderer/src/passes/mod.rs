@@ -10,4 +10,5 @@ pub(crate) mod scatter;
 pub(crate) mod shade;
 pub(crate) mod shadow;
 pub(crate) mod surface_frames;
+pub(crate) mod velocity;
 pub(crate) mod visibility;

@@ -129,7 +129,7 @@ pub fn fit_channel_exponentials(
 /// Normalized diffusion with the profile's total and the width that puts the least light in the wrong place.
 ///
 /// The published widths were fitted to index-matched media; this is the refit for any other. Also returns the fraction
-/// of misplaced light, by 160 rings.
+/// of misplaced light, by 120 rings.
 pub fn refit_normalized_diffusion(profile: &RadialProfile) -> Result<(NormalizedDiffusion, f64), SkinError> {
     let total = profile.total();
     let (low, middle, high) =
@@ -169,7 +169,7 @@ struct Fit {
 }
 
 /// Radii at which a fit looks.
-const NODES: usize = 160;
+const NODES: usize = 120;
 
 /// Weight of the row that ties the sum of the weights to the total, relative to the norm of a channel's rows.
 const SUM_ROW: f64 = 100.0;

@@ -356,9 +356,56 @@ pub struct RadialError {
 /// nodes, in the logarithm. In x it is smooth: Chandrasekhar's exact solution for the total is `1 - x H(1)`, and tails
 /// fall with `sigma_tr ~ x`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "WalkResult", into = "WalkResult")]
 pub struct AlbedoTable {
-    /// The walk, with the albedos of the nodes.
-    pub result: WalkResult,
+    // Private: the nodes and rings of a table are what `try_from` checks.
+    result: WalkResult,
+}
+
+impl From<AlbedoTable> for WalkResult {
+    fn from(table: AlbedoTable) -> Self {
+        table.result
+    }
+}
+
+impl TryFrom<WalkResult> for AlbedoTable {
+    type Error = SkinError;
+
+    /// Checks that a walk (read from a file) has the nodes and rings that a table has.
+    fn try_from(result: WalkResult) -> Result<Self, SkinError> {
+        result.walk.validate()?;
+        let nodes = chebyshev_nodes().map(|x| 1.0 - x * x);
+        let albedos = &result.walk.albedos;
+        if albedos.len() != nodes.len() || albedos.iter().zip(nodes).any(|(a, b)| (a - b).abs() > 1e-9) {
+            let found = format!("{} other albedos", albedos.len());
+            return Err(SkinError::new("table.walk.albedos", found, "the nodes of an albedo table"));
+        }
+        let edges = result.walk.rings.edges();
+        let same = edges.len() == result.edges.len()
+            && edges.iter().zip(&result.edges).all(|(a, b)| (a - b).abs() <= 1e-9 * b);
+        if !same {
+            return Err(SkinError::new("table.edges", result.edges.len(), "the edges of the walk's rings"));
+        }
+        let sound = |light: &[f64], count: usize| {
+            light.len() == count && light.iter().all(|v| v.is_finite() && *v >= 0.0)
+        };
+        let rings = &result.ring_light;
+        if rings.len() != nodes.len() || !rings.iter().all(|ring| sound(ring, edges.len())) {
+            return Err(SkinError::new(
+                "table.ring_light",
+                "a wrong count or value",
+                "light of every node and ring",
+            ));
+        }
+        if !sound(&result.total, nodes.len()) || result.total.contains(&0.0) {
+            return Err(SkinError::new(
+                "table.total",
+                "a wrong count or value",
+                "a positive total of every node",
+            ));
+        }
+        Ok(Self { result })
+    }
 }
 
 /// Chebyshev nodes of an [`AlbedoTable`].
@@ -376,6 +423,11 @@ fn chebyshev_nodes() -> [f64; ALBEDO_NODES] {
 }
 
 impl AlbedoTable {
+    /// The walk, with the albedos of the nodes.
+    pub fn result(&self) -> &WalkResult {
+        &self.result
+    }
+
     /// Walks photons for all albedos at once. A million photons take seconds.
     pub fn build(anisotropy: f64, eta: f64, photons: u64, seed: u64) -> Result<Self, SkinError> {
         let albedos = chebyshev_nodes().iter().map(|x| 1.0 - x * x).collect();

@@ -91,6 +91,19 @@ fn fit_to_skin_is_at_least_as_close_as_table_6_1() {
     let table = (1..60).map(|i| squares(&ArtistKernel::thesis(0.5 * i as f64))).fold(f64::INFINITY, f64::min);
     let fitted = fit_artist(&grid, &exact);
     assert!(squares(&fitted) < table, "{} {table}", squares(&fitted));
+    // No other falloff and strength of the family is closer.
+    for (c, exact) in exact.iter().enumerate() {
+        let own = |artist: &ArtistKernel| {
+            let half = artist.kernel(&grid).half(c);
+            (exact - grid.separable_quadrant(&half)).norm_squared()
+        };
+        let best = own(&fitted);
+        for i in 0..400 {
+            let (falloff, strength) = (0.002 * 1.4f64.powi(i / 20), 0.05 * (1 + i % 20) as f64);
+            let other = ArtistKernel { falloff: [falloff; 3], strength: [strength; 3], ..fitted };
+            assert!(best <= own(&other) + 1e-12, "{c}: {best}, {falloff} {strength} {}", own(&other));
+        }
+    }
     // As in the table: red reaches farthest, blue least, and most of the light of every channel scatters.
     assert!(fitted.falloff[0] > fitted.falloff[1] && fitted.falloff[1] > fitted.falloff[2], "{fitted:?}");
     assert!(fitted.strength.iter().all(|s| (0.7..=1.0).contains(s)), "{fitted:?}");

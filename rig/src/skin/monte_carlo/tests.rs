@@ -41,9 +41,42 @@ fn total_with_a_refracting_surface_matches_giovanelli() {
 }
 
 #[test]
-fn anisotropic_total_matches_van_de_hulst() {
-    // van de Hulst 1980 by way of Prahl et al. 1989 has a slab; for a half space similarity is the check: strong
-    // forward scattering at a high albedo approaches the reduced medium.
+fn scattered_directions_have_the_mean_cosine_of_henyey_and_greenstein() {
+    let mut random = Random::new(13, 0);
+    let from: (f64, f64, f64) = (0.6, 0.0, -0.8);
+    for g in [-0.5, 0.3, 0.9] {
+        let (mut first, mut second, n) = (0.0, 0.0, 200_000);
+        for _ in 0..n {
+            let (x, y, z) = scatter(from, g, &mut random);
+            assert!((x * x + y * y + z * z - 1.0).abs() < 1e-12);
+            let cos = x * from.0 + y * from.1 + z * from.2;
+            first += cos / n as f64;
+            second += 0.5 * (3.0 * cos * cos - 1.0) / n as f64;
+        }
+        // The moments of Legendre polynomials are g and g^2.
+        assert!((first - g).abs() < 4e-3 && (second - g * g).abs() < 4e-3, "{g}: {first} {second}");
+    }
+}
+
+#[test]
+fn weak_anisotropic_scattering_matches_the_single_scattering_integral() {
+    // At a matched index and a small albedo a: a integral 2 pi p(-mu) mu / (1 + mu) dmu.
+    let (albedo, g) = (1e-4, 0.5f64);
+    let phase = |mu: f64| (1.0 - g * g) / (4.0 * PI * (1.0 + g * g + 2.0 * g * mu).powf(1.5));
+    let rule = gauss_legendre(32);
+    let single: f64 = rule
+        .iter()
+        .map(|(x, w)| (0.5 * (x + 1.0), 0.5 * w))
+        .map(|(mu, w)| w * 2.0 * PI * phase(mu) * mu / (1.0 + mu))
+        .sum();
+    let walk = PhotonWalk { anisotropy: g, ..PhotonWalk::isotropic(1.0, vec![albedo], 200_000, 14) };
+    let result = walk.run().unwrap();
+    let (found, error) = (result.total[0] / albedo, result.total_error[0] / albedo);
+    assert!((found - single).abs() < 4.0 * error + 1e-3 * single, "{found} +- {error}, exact {single}");
+}
+
+#[test]
+fn forward_scattering_approaches_its_reduced_medium_in_total() {
     let walk = PhotonWalk {
         anisotropy: 0.8,
         rings: Rings { outer: 2000.0, ..Rings::default() },
@@ -91,16 +124,16 @@ fn all_light_is_counted_once() {
 #[test]
 fn interpolated_profile_matches_a_walk_of_its_own() {
     // The albedo is no node of the table and the seeds differ.
-    let table = AlbedoTable::build(0.0, 1.4, 60_000, 10).unwrap();
+    let table = AlbedoTable::build(0.0, 1.4, 30_000, 10).unwrap();
     let medium = Medium::new(0.88, 0.17, 1.4).unwrap();
-    let walk = PhotonWalk::isotropic(1.4, vec![medium.albedo()], 240_000, 11).run().unwrap();
+    let walk = PhotonWalk::isotropic(1.4, vec![medium.albedo()], 120_000, 11).run().unwrap();
     let profile = RadialProfile::Tabulated(table.profile(&medium).unwrap());
     let error = walk.compare(0, medium.sigma_t_prime_per_mm(), &profile);
     // The table has a quarter of the photons, so both together have the root of 5 times the walk's noise: anything
     // more would be an error of the interpolation.
     assert!(error.relative < 1.2 * 5f64.sqrt() * error.noise, "{error:?}");
     let total = table.total(medium.albedo()).unwrap();
-    assert!((total - walk.total[0]).abs() < 0.015 * total, "{total} {}", walk.total[0]);
+    assert!((total - walk.total[0]).abs() < 0.02 * total, "{total} {}", walk.total[0]);
 }
 
 #[test]
@@ -113,6 +146,23 @@ fn table_survives_serialisation() {
     let medium = Medium::new(1.0, 0.1, 1.3).unwrap();
     let (a, b) = (table.profile(&medium).unwrap(), again.profile(&medium).unwrap());
     assert!((a.mass_beyond(0.5) - b.mass_beyond(0.5)).abs() < 1e-12);
+}
+
+#[test]
+fn damaged_tables_are_errors() {
+    let good = WalkResult::from(AlbedoTable::build(0.0, 1.3, 500, 12).unwrap());
+    let at = |damage: &dyn Fn(&mut WalkResult)| {
+        let mut result = good.clone();
+        damage(&mut result);
+        AlbedoTable::try_from(result).unwrap_err().at
+    };
+    assert_eq!(at(&|r| r.walk.albedos[0] = 0.5), "table.walk.albedos");
+    assert_eq!(at(&|r| r.walk.eta = 9.0), "walk.eta");
+    assert_eq!(at(&|r| r.edges.truncate(3)), "table.edges");
+    assert_eq!(at(&|r| r.ring_light[2].truncate(5)), "table.ring_light");
+    assert_eq!(at(&|r| r.ring_light[2][3] = f64::NAN), "table.ring_light");
+    assert_eq!(at(&|r| r.total.clear()), "table.total");
+    assert!(AlbedoTable::try_from(good).is_ok());
 }
 
 #[test]
