@@ -8,7 +8,7 @@
 
 use rubor_renderer::{Gpu, PassTimer};
 use rubor_renderer::antialias::{
-    Antialias, BlendSpace, Dispatch, History, Inputs, Mode, Preset, Settings,
+    Antialias, BlendSpace, Filter, reference::Picture, DiagonalEdges, Dispatch, History, Inputs, Mode, Preset, Settings,
 };
 use std::time::Instant;
 use wgpu::{TextureFormat, TextureUsages};
@@ -41,6 +41,7 @@ fn main() -> Result<()> {
         let ours = bench.ours(&gpu)?;
         let name = std::path::Path::new(&path).file_name().unwrap_or_default().to_string_lossy().into_owned();
         report(&name, &image, &ours, &theirs);
+        explain(&gpu, &image, &ours, &theirs)?;
         if let Some(folder) = std::env::var_os("RUBOR_OUT") {
             let folder = std::path::PathBuf::from(folder);
             let save = |suffix: &str, bytes: Vec<u8>| {
@@ -59,6 +60,44 @@ fn main() -> Result<()> {
             *first.get_pixel(x % first.width(), y % first.height())
         });
         times(&gpu, &image, runs)?;
+    }
+    Ok(())
+}
+
+/// What the crate does.
+fn as_published() -> Settings {
+    Settings {
+        blend_space: BlendSpace::Stored,
+        diagonal_edges: DiagonalEdges::Published,
+        ..Settings::new(Mode::Smaa1x, Preset::High)
+    }
+}
+
+/// Sorts the pixels that differ by more than 1/255 by the weights there: whether the directions are a tie, so that one
+/// step of rounding decides which neighbours are taken.
+fn explain(gpu: &Gpu, image: &image::RgbaImage, ours: &[u8], theirs: &[u8]) -> Result<()> {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let pixels = image.pixels().map(|pixel| pixel.0.map(|v| f32::from(v) / 255.0)).collect();
+    let weights = Filter::new(gpu, as_published())?.weights(&Picture { width, height, pixels })?;
+    let weight = |x: usize, y: usize, channel: usize| {
+        if x < width && y < height { i32::from(weights[y * width + x][channel]) } else { 0 }
+    };
+    // Of differences up to 3 and of larger ones: all, and those at ties of up to 2 and up to 4 steps of 1/255.
+    let mut counts = [[0; 3]; 2];
+    for i in 0..width * height {
+        let worst = (0..3).map(|c| ours[4 * i + c].abs_diff(theirs[4 * i + c])).max().unwrap_or(0);
+        if worst > 1 {
+            let (x, y) = (i % width, i / width);
+            let vertical = weight(x, y, 0).max(weight(x, y + 1, 1));
+            let horizontal = weight(x, y, 2).max(weight(x + 1, y, 3));
+            let counts = &mut counts[usize::from(worst > 3)];
+            counts[0] += 1;
+            counts[1] += usize::from((vertical - horizontal).abs() <= 2);
+            counts[2] += usize::from((vertical - horizontal).abs() <= 4);
+        }
+    }
+    for (name, [all, two, four]) in ["2 to 3", "over 3"].into_iter().zip(counts) {
+        println!("    differences of {name:<7} {all:>5}: directions within 2/255 at {two:>5}, within 4/255 at {four:>5}");
     }
     Ok(())
 }
@@ -113,9 +152,7 @@ impl Bench {
     }
 
     fn ours(&self, gpu: &Gpu) -> Result<Vec<u8>> {
-        let settings =
-            Settings { blend_space: BlendSpace::Stored, ..Settings::new(Mode::Smaa1x, Preset::High) };
-        let pass = Antialias::new(gpu, &settings, self.size, FORMAT)?;
+        let pass = Antialias::new(gpu, &as_published(), self.size, FORMAT)?;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let input = Self::view(&self.input);
         let inputs = Inputs { colors: &[&input], ..Default::default() };

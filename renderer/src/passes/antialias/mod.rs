@@ -30,6 +30,9 @@
 //!   kernel copies the image on its way, so that 1x reads and writes every pixel once.
 //! - Contrast is compared in whole 1/65535 steps of luma, so ties do not depend on rounding. Alpha is a channel of its
 //!   own in edge detection, and straight alpha weighs blended colours.
+//! - Diagonals that fall to the right stand for the left edges of their own steps, and the coverage of diagonals with an
+//!   open end does not depend on which end that is. The published shader gives those edges weights twice, so that
+//!   mirrored images differ; [`DiagonalEdges::Published`] does the same.
 //! - Colour edges compare neighbours at a distance of one pixel throughout; the published shader compares with the
 //!   pixel two to the left in one of its terms.
 //! - Outside of the image lines run on and nothing crosses them; the published shader repeats the edges of the
@@ -59,7 +62,9 @@ mod settings;
 mod tables;
 
 pub use filter::Filter;
-pub use settings::{Alpha, BlendSpace, EdgeSource, Encoding, Mode, Predication, Preset, Settings, Subsample};
+pub use settings::{
+    Alpha, BlendSpace, DiagonalEdges, EdgeSource, Encoding, Mode, Predication, Preset, Settings, Subsample,
+};
 pub use tables::Tables;
 
 use crate::gpu::{Gpu, PassTimer};
@@ -581,10 +586,11 @@ impl Kernel {
             ),
             Self::Weights => format!(
                 "const STOP_AT_CROSSINGS = {};\nconst DIAGONALS = {};\nconst ROUND_CORNERS = {};\n\
-                 const DIAGONAL_SLOT = {}u;\n",
+                 const PUBLISHED_DIAGONALS = {};\nconst DIAGONAL_SLOT = {}u;\n",
                 mode != Mode::Mlaa,
                 settings.diagonal_steps > 0,
                 settings.corner_rounding < 100,
+                settings.diagonal_edges == DiagonalEdges::Published,
                 lookups::DIAGONAL_SLOT,
             ),
             Self::Blend | Self::Resolve => format!(

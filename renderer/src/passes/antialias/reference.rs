@@ -3,7 +3,7 @@
 //! The image is continued by its border pixels, so outside of it there are no new edges and lines run on.
 
 use super::lookups::{AreaTable, DIAGONAL_SLOT};
-use super::settings::{Alpha, BlendSpace, EdgeSource, Encoding, Mode, Settings, Subsample};
+use super::settings::{Alpha, BlendSpace, DiagonalEdges, EdgeSource, Encoding, Mode, Settings, Subsample};
 use super::tables::Tables;
 use rayon::prelude::*;
 
@@ -248,7 +248,14 @@ fn line_weights(
     area
 }
 
-/// Weights of the two diagonals through the upper border of (x, y), or zeros.
+/// Weights of the two diagonals through the upper border of a pixel, zeros where there is none.
+#[derive(Clone, Copy, Default)]
+struct Diagonals {
+    rising: [f64; 2],
+    falling: [f64; 2],
+}
+
+/// Diagonals through the upper border of (x, y).
 fn diagonal_weights(
     edges: &Edges,
     x: isize,
@@ -256,7 +263,7 @@ fn diagonal_weights(
     blocks: [usize; 2],
     areas: &AreaTable,
     steps: u32,
-) -> [f64; 2] {
+) -> Diagonals {
     let upright = Lines { edges, turned: false };
     let top = |x: isize, y: isize| upright.line(x, y);
     let left = |x: isize, y: isize| upright.crossing(x, y);
@@ -277,11 +284,7 @@ fn diagonal_weights(
         }
         (steps - 1, false, true)
     };
-    let mut sum = [0.0; 2];
-    let mut add = |area: [f64; 2]| {
-        sum[0] += area[0];
-        sum[1] += area[1];
-    };
+    let (mut rising, mut falling) = ([0.0; 2], [0.0; 2]);
 
     // Rising to the right: steps of a left and a top edge of the same pixel.
     let mut near = (0, true, false);
@@ -295,7 +298,7 @@ fn diagonal_weights(
         let near_code = u32::from(left(x - a, y + a)) + 2 * u32::from(top(x - a - 1, y + a));
         let far_code = u32::from(left(x + b + 1, y - b - 1)) + 2 * u32::from(top(x + b + 1, y - b));
         let found = |code: u32, found: bool| if found { code } else { 0 };
-        add(lookup(blocks[0], found(near_code, near.1), found(far_code, far.1), (near.0, far.0)));
+        rising = lookup(blocks[0], found(near_code, near.1), found(far_code, far.1), (near.0, far.0));
     }
 
     // Falling to the right: steps of a right and a top edge of the same pixel.
@@ -311,9 +314,9 @@ fn diagonal_weights(
         let far_code = u32::from(left(x + b + 1, y + b)) + 2 * u32::from(top(x + b + 1, y + b));
         let found = |code: u32, found: bool| if found { code } else { 0 };
         let [a, b] = lookup(blocks[1], found(near_code, near.1), found(far_code, far.1), (near.0, far.0));
-        add([b, a]);
+        falling = [b, a];
     }
-    sum
+    Diagonals { rising, falling }
 }
 
 /// Lifts sums that are a half but for rounding, so that ties go up as in integers.
@@ -331,21 +334,30 @@ pub fn blending_weights(
     let weights_at = |i: usize| -> Weights {
         let (x, y) = ((i % edges.width) as isize, (i / edges.width) as isize);
         let mut weights = [0; 4];
-        let mut diagonal = false;
+        let diagonals = |x: isize, y: isize| {
+            if settings.diagonal_steps == 0 || !rows.line(x, y) {
+                return Diagonals::default();
+            }
+            diagonal_weights(edges, x, y, [blocks[2], blocks[3]], areas, settings.diagonal_steps)
+        };
+        let some = |area: [f64; 2]| area[0] + area[1] > 0.0;
+        let own = diagonals(x, y);
         if edges.top[i] {
-            let mut area = [0.0; 2];
-            if settings.diagonal_steps > 0 {
-                area = diagonal_weights(edges, x, y, [blocks[2], blocks[3]], areas, settings.diagonal_steps);
-                diagonal = area[0] + area[1] > 0.0;
-            }
-            if !diagonal {
-                area = line_weights(&rows, x, y, blocks[1], areas, settings);
-            }
+            let area = if some(own.rising) || some(own.falling) {
+                [own.rising[0] + own.falling[0], own.rising[1] + own.falling[1]]
+            } else {
+                line_weights(&rows, x, y, blocks[1], areas, settings)
+            };
             weights[0] = byte(area[0]);
             weights[1] = byte(area[1]);
         }
-        // A diagonal has treated both edges of the pixel.
-        if edges.left[i] && !diagonal {
+        // A diagonal stands for both edges of its steps: a rising one for the left edge of the same pixel, a falling
+        // one for the left edge of the next pixel.
+        let treated = match settings.diagonal_edges {
+            DiagonalEdges::Both => some(own.rising) || (x > 0 && some(diagonals(x - 1, y).falling)),
+            DiagonalEdges::Published => some(own.rising) || some(own.falling),
+        };
+        if edges.left[i] && !treated {
             let area = line_weights(&columns, y, x, blocks[0], areas, settings);
             weights[2] = byte(area[0]);
             weights[3] = byte(area[1]);

@@ -135,6 +135,18 @@ pub enum Alpha {
     Associated,
 }
 
+/// Which left edges a diagonal stands for, beside the top edges that it was found at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum DiagonalEdges {
+    /// Those of its own steps: for diagonals that fall to the right they belong to the next pixel. Both kinds of
+    /// diagonals then look alike.
+    #[default]
+    Both,
+    /// Always that of the same pixel, as in the published shader: the steps of falling diagonals get weights twice.
+    Published,
+}
+
 /// Makes colour edges count more where depth jumps too: the threshold is raised everywhere and lowered there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Predication {
@@ -183,6 +195,8 @@ pub struct Settings {
     pub search_steps: u32,
     /// Distance in pixels to which ends of diagonals are searched, 0 (no diagonals) to 19.
     pub diagonal_steps: u32,
+    /// Which left edges belong to diagonals.
+    pub diagonal_edges: DiagonalEdges,
     /// How much corners are rounded in percent, 0 (kept sharp) to 100 (like any line).
     pub corner_rounding: u32,
     /// Depth lowers the threshold of colour edges.
@@ -220,6 +234,7 @@ impl Settings {
             depth_threshold: threshold * 0.1,
             search_steps,
             diagonal_steps,
+            diagonal_edges: DiagonalEdges::Both,
             corner_rounding,
             predication: None,
             encoding: Encoding::Srgb,

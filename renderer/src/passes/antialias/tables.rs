@@ -1,7 +1,7 @@
 //! The coverage that a mode needs, and where its subsamples find theirs.
 
 use super::lookups::{AreaTable, area_texture, mlaa_area_texture};
-use super::settings::{Mode, Settings, Subsample};
+use super::settings::{DiagonalEdges, Mode, Settings, Subsample};
 
 /// Coverage for the subsample offsets of a mode.
 #[derive(Debug, Clone)]
@@ -29,7 +29,13 @@ impl Tables {
             AreaTable::mlaa(&mlaa_area_texture())
         } else {
             let (_, longest) = super::reference::search_limits(settings);
-            AreaTable::smaa(&area_texture(), longest as usize, &orthogonal_blocks, &diagonal_blocks)
+            AreaTable::smaa(
+                &area_texture(),
+                longest as usize,
+                &orthogonal_blocks,
+                &diagonal_blocks,
+                settings.diagonal_edges == DiagonalEdges::Both,
+            )
         };
         Self { areas, orthogonal_blocks, diagonal_blocks }
     }

@@ -155,41 +155,41 @@ fn diagonal_area(block: u32, near: u32, far: u32, distances: vec2<u32>) -> vec2<
     return vec2(packed & 0xffffu, packed >> 16u);
 }
 
-// Both diagonals through the top edge of a pixel, figure 10.7.
-fn diagonal_weights(p: vec2<i32>, left: u32) -> vec2<u32> {
-    var sum = vec2(0u);
-
-    // Rising to the right.
+// The diagonal that rises to the right through the top edge of a pixel (figure 10.7), or zeros.
+fn rising_weights(p: vec2<i32>, left: u32) -> vec2<u32> {
     var near = End(0u, 3u, 0u);
     if left == 1u {
         near = walk(p, vec2(-1, 1), false);
         near.distance += near.tread;
     }
-    var far = walk(p, vec2(1, -1), false);
-    if near.distance + far.distance > 2u {
-        let start = p + vec2(-1, 1) * i32(near.distance);
-        let end = p + vec2(1, -1) * i32(far.distance);
-        let near_code = (pixel_bits(start).y | (pixel_bits(start + vec2(-1, 0)).x << 1u)) & near.found;
-        let far_code = (pixel_bits(end + vec2(1, -1)).y | (pixel_bits(end + vec2(1, 0)).x << 1u)) & far.found;
-        sum = diagonal_area(params.blocks.z, near_code, far_code, vec2(near.distance, far.distance));
+    let far = walk(p, vec2(1, -1), false);
+    if near.distance + far.distance <= 2u {
+        return vec2(0u);
     }
+    let start = p + vec2(-1, 1) * i32(near.distance);
+    let end = p + vec2(1, -1) * i32(far.distance);
+    let near_code = (pixel_bits(start).y | (pixel_bits(start + vec2(-1, 0)).x << 1u)) & near.found;
+    let far_code = (pixel_bits(end + vec2(1, -1)).y | (pixel_bits(end + vec2(1, 0)).x << 1u)) & far.found;
+    return diagonal_area(params.blocks.z, near_code, far_code, vec2(near.distance, far.distance));
+}
 
-    // Falling to the right.
-    near = walk(p, vec2(-1, -1), true);
-    far = End(0u, 3u, 0u);
+// The same for the one that falls to the right.
+fn falling_weights(p: vec2<i32>) -> vec2<u32> {
+    let near = walk(p, vec2(-1, -1), true);
+    var far = End(0u, 3u, 0u);
     if pixel_bits(p + vec2(1, 0)).y == 1u {
         far = walk(p, vec2(1, 1), true);
         far.distance += far.tread;
     }
-    if near.distance + far.distance > 2u {
-        let start = p - vec2(i32(near.distance));
-        let end = p + vec2(i32(far.distance));
-        let near_code = (pixel_bits(start + vec2(0, -1)).y | (pixel_bits(start + vec2(-1, 0)).x << 1u)) & near.found;
-        let beyond = pixel_bits(end + vec2(1, 0));
-        let far_code = (beyond.y | (beyond.x << 1u)) & far.found;
-        sum += diagonal_area(params.blocks.w, near_code, far_code, vec2(near.distance, far.distance)).yx;
+    if near.distance + far.distance <= 2u {
+        return vec2(0u);
     }
-    return sum;
+    let start = p - vec2(i32(near.distance));
+    let end = p + vec2(i32(far.distance));
+    let near_code = (pixel_bits(start + vec2(0, -1)).y | (pixel_bits(start + vec2(-1, 0)).x << 1u)) & near.found;
+    let beyond = pixel_bits(end + vec2(1, 0));
+    let far_code = (beyond.y | (beyond.x << 1u)) & far.found;
+    return diagonal_area(params.blocks.w, near_code, far_code, vec2(near.distance, far.distance)).yx;
 }
 
 fn stored_weight(weight: vec2<u32>) -> vec2<f32> {
@@ -201,19 +201,26 @@ fn weigh(p: vec2<i32>) {
     let own = pixel_bits(p);
     var vertical = vec2(0u);
     var horizontal = vec2(0u);
-    var diagonal = false;
+    // Whether a diagonal stands for the left edge too.
+    var treated = false;
     if own.x == 1u {
         if DIAGONALS {
-            vertical = diagonal_weights(p, own.y);
-            diagonal = any(vertical != vec2(0u));
+            let rising = rising_weights(p, own.y);
+            let falling = falling_weights(p);
+            vertical = rising + falling;
+            treated = any(rising != vec2(0u)) || (PUBLISHED_DIAGONALS && any(falling != vec2(0u)));
         }
-        if !diagonal {
+        if all(vertical == vec2(0u)) {
             vertical = line_weights(rows(), p.y, p.x, params.blocks.y);
         }
     }
-    // A diagonal has treated both edges of the pixel.
-    if own.y == 1u && !diagonal {
-        horizontal = line_weights(columns(), p.x, p.y, params.blocks.x);
+    if own.y == 1u && !treated {
+        if DIAGONALS && !PUBLISHED_DIAGONALS && pixel_bits(p - vec2(1, 0)).x == 1u {
+            treated = any(falling_weights(p - vec2(1, 0)) != vec2(0u));
+        }
+        if !treated {
+            horizontal = line_weights(columns(), p.x, p.y, params.blocks.x);
+        }
     }
     textureStore(weights_out, p, vec4(stored_weight(vertical), stored_weight(horizontal)));
 }

@@ -129,6 +129,9 @@ impl AreaTable {
     /// What bilinear fetches of `texture` (from [`area_texture`]) return for distances up to `longest` pixels,
     /// for the given blocks of subsample offsets. Diagonals exist for blocks 0 to 4.
     ///
+    /// In the published texture a diagonal without a crossing edge at one end depends on which end that is;
+    /// `symmetric` takes the mean with the same diagonal turned by 180 degrees.
+    ///
     /// # Panics
     /// When a block does not exist or `longest` is over 225, the last distance in the texture.
     pub fn smaa(
@@ -136,6 +139,7 @@ impl AreaTable {
         longest: usize,
         orthogonal_blocks: &[usize],
         diagonal_blocks: &[usize],
+        symmetric: bool,
     ) -> Self {
         let last = ORTHOGONAL_SLOT - 1;
         assert!(longest <= last * last, "the area texture ends at a distance of {} pixels", last * last);
@@ -178,9 +182,20 @@ impl AreaTable {
             for pattern in 0..16 {
                 for left in 0..DIAGONAL_SLOT {
                     for right in 0..DIAGONAL_SLOT {
-                        let x = AREA_WIDTH / 2 + (pattern & 3) * DIAGONAL_SLOT + left;
-                        let y = block * BLOCK_HEIGHT + (pattern >> 2) * DIAGONAL_SLOT + right;
-                        areas.push(texel(x, y, 0) * 257 | ((texel(x, y, 1) * 257) << 16));
+                        let area = |block: usize, near: usize, far: usize, left: usize, right: usize| {
+                            let x = AREA_WIDTH / 2 + near * DIAGONAL_SLOT + left;
+                            let y = block * BLOCK_HEIGHT + far * DIAGONAL_SLOT + right;
+                            [texel(x, y, 0) * 257, texel(x, y, 1) * 257]
+                        };
+                        let (near, far) = (pattern & 3, pattern >> 2);
+                        let mut own = area(block, near, far, left, right);
+                        if symmetric {
+                            // The same stair turned upside down: ends, sides and the sample's place swap.
+                            let opposite = [0, 2, 1, 4, 3][block];
+                            let turned = area(opposite, far, near, right, left);
+                            own = [(own[0] + turned[1]) / 2, (own[1] + turned[0]) / 2];
+                        }
+                        areas.push(own[0] | (own[1] << 16));
                     }
                 }
             }
@@ -197,7 +212,7 @@ impl AreaTable {
                     let x = SLOT_OF_CROSSING[pattern & 3] * MLAA_SLOT + left;
                     let y = SLOT_OF_CROSSING[pattern >> 2] * MLAA_SLOT + right;
                     let at = (y * 5 * MLAA_SLOT + x) * 2;
-                    areas.push(u32::from(texture[at]) * 257 | ((u32::from(texture[at + 1]) * 257) << 16));
+                    areas.push((u32::from(texture[at]) * 257) | ((u32::from(texture[at + 1]) * 257) << 16));
                 }
             }
         }
