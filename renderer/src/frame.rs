@@ -317,6 +317,29 @@ impl Renderer {
         Ok(points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect())
     }
 
+    /// Linear radiance of the last frame (of its last sample), RGB and coverage, rows from the top.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_hdr(&self) -> Result<Vec<[f32; 4]>, RenderError> {
+        let Some(targets) = &self.targets else { return Ok(Vec::new()) };
+        let bytes = self.gpu.read_texture(targets.hdr.texture())?;
+        let halves: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
+    }
+
+    /// Normal and tangent (w = sign of the bitangent) of each vertex of the first head of the last frame, world space.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_surface_frames(&self) -> Result<Vec<(Vec3, glam::Vec4)>, RenderError> {
+        let Some(instance) = self.instances.first() else { return Ok(Vec::new()) };
+        let bytes = self.gpu.read_buffer(&instance.frames)?;
+        let frames: Vec<[f32; 8]> = bytemuck::pod_collect_to_vec(&bytes);
+        let frame = |f: [f32; 8]| (Vec3::new(f[0], f[1], f[2]), glam::Vec4::new(f[4], f[5], f[6], f[7]));
+        Ok(frames.into_iter().map(frame).collect())
+    }
+
     fn check(&self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
         let limit = |what, found: String, expected: String| Err(RenderError::Limit { what, found, expected });
         let most = self.gpu.device.limits().max_texture_dimension_2d;

@@ -24,6 +24,10 @@ mod gpu;
 mod head;
 mod passes;
 mod scene;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
 mod texture;
 
 pub use environment::{Environment, EnvironmentMap};

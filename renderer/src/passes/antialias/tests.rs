@@ -2,19 +2,6 @@ use super::reference::*;
 use super::scenes::*;
 use super::*;
 
-/// The device of the tests; without one they are skipped, or fail where `RUBOR_REQUIRE_GPU` is set.
-fn gpu() -> Option<&'static Gpu> {
-    static GPU: std::sync::OnceLock<Option<Gpu>> = std::sync::OnceLock::new();
-    GPU.get_or_init(|| match Gpu::new(None) {
-        Ok(gpu) => Some(gpu),
-        Err(error) => {
-            assert!(std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: {error}");
-            eprintln!("SKIPPED: {error}");
-            None
-        }
-    })
-    .as_ref()
-}
 
 /// A small generator of repeatable noise (xorshift).
 struct Noise(u64);
