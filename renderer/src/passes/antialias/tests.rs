@@ -1,7 +1,7 @@
 use super::reference::*;
 use super::scenes::*;
 use super::*;
-
+use crate::testing::gpu;
 
 /// A small generator of repeatable noise (xorshift).
 struct Noise(u64);
