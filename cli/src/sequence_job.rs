@@ -8,16 +8,16 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
-use rubor_renderer::{Gpu, Image, Renderer, Settings};
+use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, Settings};
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
-use rubor_rig::skin::kernel::SeparableKernel;
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::timeline::Sequence;
 use serde_json::json;
@@ -42,9 +42,10 @@ pub(crate) struct Arguments {
     /// Frames a second [default: the sequence's]
     #[arg(long)]
     pub(crate) fps: Option<f64>,
-    /// Subsurface scattering: none, or separable:N with an odd N from 5 to 65
-    #[arg(long, default_value = "separable:17", value_parser = parse_scatter, value_name = "METHOD")]
-    pub(crate) scatter: Scatter,
+    /// Subsurface scattering: none, separable:N (N odd, 5 to 65), screen-gauss:4, screen-gauss:6, screen-jitter,
+    /// burley-disk:N (N from 4 to 256), reference-screen, reference-surface
+    #[arg(long, default_value = "separable:17", value_name = "METHOD")]
+    pub(crate) scatter: ScatterMethod,
     /// Antialiasing: none, or ssaa:N with N x N samples a pixel
     #[arg(long, default_value = "ssaa:2", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
@@ -68,29 +69,11 @@ pub(crate) struct Arguments {
     pub(crate) json: bool,
 }
 
-/// A scattering method by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Scatter {
-    None,
-    Separable(usize),
-}
-
 /// An antialiasing method by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Antialias {
     None,
     Supersampling(u32),
-}
-
-fn parse_scatter(text: &str) -> Result<Scatter, String> {
-    if text == "none" {
-        return Ok(Scatter::None);
-    }
-    let samples = text.strip_prefix("separable:").and_then(|n| n.parse().ok());
-    match samples {
-        Some(n) if n % 2 == 1 && (5..=65).contains(&n) => Ok(Scatter::Separable(n)),
-        _ => Err(format!("found {text:?}, expected none, or separable:N with an odd N from 5 to 65")),
-    }
 }
 
 fn parse_antialias(text: &str) -> Result<Antialias, String> {
@@ -192,7 +175,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         "size": size,
         "frames": frames,
         "framesDrawn": drawn.len(),
-        "scatter": format!("{:?}", arguments.scatter),
+        "scatter": arguments.scatter.to_string(),
         "antialias": format!("{:?}", arguments.antialias),
         "secondsToFirstFrame": first_frame_s,
         "secondsPerFrame": median(&mut drawn),
@@ -211,15 +194,18 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
 }
 
 fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
-    let scatter = match arguments.scatter {
-        Scatter::None => None,
-        Scatter::Separable(n) => Some(SeparableKernel::of(&Profile::deon_six(), n).map_err(Failure::input)?),
-    };
     let supersampling = match arguments.antialias {
         Antialias::None => 1,
         Antialias::Supersampling(n) => n,
     };
-    Ok(Settings { size, scatter, supersampling, shadow_size: 2048, exposure: arguments.exposure })
+    Ok(Settings {
+        size,
+        scatter: arguments.scatter,
+        profile: Arc::new(Profile::deon_six()),
+        supersampling,
+        shadow_size: 2048,
+        exposure: arguments.exposure,
+    })
 }
 
 /// Writes down what job the folder holds. False where a stopped run of the same job goes on.
@@ -229,7 +215,7 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
         "rig": job.rig,
         "sequence": job.sequence,
         "size": size,
-        "scatter": format!("{:?}", arguments.scatter),
+        "scatter": arguments.scatter.to_string(),
         "antialias": format!("{:?}", arguments.antialias),
         "exposure": arguments.exposure,
         "program": env!("CARGO_PKG_VERSION"),
@@ -368,11 +354,6 @@ mod tests {
 
     #[test]
     fn methods_are_read_by_name() {
-        assert_eq!(parse_scatter("separable:17"), Ok(Scatter::Separable(17)));
-        assert_eq!(parse_scatter("none"), Ok(Scatter::None));
-        for wrong in ["separable:16", "separable:67", "separable", "gauss"] {
-            assert!(parse_scatter(wrong).unwrap_err().contains(wrong));
-        }
         assert_eq!(parse_antialias("ssaa:4"), Ok(Antialias::Supersampling(4)));
         assert!(parse_antialias("ssaa:0").is_err());
     }

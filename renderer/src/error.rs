@@ -37,6 +37,9 @@ pub enum RenderError {
     /// The head breaks a rule of [`rubor_rig::head::Head`].
     #[error(transparent)]
     Head(#[from] rubor_rig::error::HeadError),
+    /// The diffusion profile or a kernel of it is out of range.
+    #[error(transparent)]
+    Skin(#[from] rubor_rig::error::SkinError),
     /// The device stopped answering or ran out of memory.
     #[error("the device failed: {0}")]
     Lost(String),
