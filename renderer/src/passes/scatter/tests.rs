@@ -204,7 +204,7 @@ fn hostile(seed: u64) -> Frame {
     let cells: Vec<_> = (0..27 * 51)
         .map(|i| {
             let (x, y) = ((i % 27) as f64, (i / 27) as f64);
-            let bright = if next() > 0.99 { 3000.0 } else { 1.0 };
+            let bright = if next() > 0.99 { 30.0 } else { 1.0 };
             let color = [next() * bright, next() * bright, next()];
             let strength = if next() > 0.9 { 0.0 } else { 0.2 + 0.8 * next() };
             let depth = if x + 0.4 * y > 25.0 { 420.0 + 0.4 * x } else { 400.0 + 0.1 * x - 0.3 * y };
@@ -214,12 +214,13 @@ fn hostile(seed: u64) -> Frame {
     Frame::new([27, 51], 900.0, |x, y| cells[y * 27 + x])
 }
 
-/// Pixels agree within a bound relative to the largest value near them: sums of halves keep 11 bits, f32 loads more.
+/// Pixels agree within a relative bound for halves, which keep 11 bits, and one for depths: f32 knows 400 mm to 3e-5 mm,
+/// and a tangent plane ten pixels away multiplies that.
 fn assert_close(name: &str, found: &[[f64; 4]], expected: &Frame, relative: f64) {
     let largest = expected.color.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
     for (i, (f, e)) in found.iter().zip(&expected.color).enumerate() {
         for c in 0..3 {
-            let bound = relative * e[c].abs() + 2e-7 * largest;
+            let bound = relative * e[c].abs() + 2e-5 * largest;
             let at = (i % expected.width, i / expected.width);
             assert!((f[c] - e[c]).abs() <= bound, "{name} at {at:?} channel {c}: {} and not {}", f[c], e[c]);
         }
@@ -330,7 +331,7 @@ fn the_exact_kernel_agrees_with_integrals_over_pixels() {
         ..frame
     };
     let found = run(&gpu, ScatterMethod::ReferenceScreen, &profile, &corner);
-    // 8 x 8 parts of a pixel of half a millimetre across a Gaussian of 0.08 mm.
+    // Linear interpolation in the table, 0.006 mm between entries where a Gaussian has 0.08 mm.
     assert_close("reference-screen", &found, &corner.exact(exact::half_width_mm(&profile), &light), 1e-2);
 }
 
@@ -342,10 +343,7 @@ fn even_light_on_a_plane_stays_even() {
             let frame = Frame::new([51, 27], 800.0, |x, _| ([0.7, 1.5, 0.1], 1.0, 400.0 + tilt * x as f64));
             for pixel in run(&gpu, method, &skin(), &frame) {
                 for (found, expected) in pixel.iter().zip([0.7, 1.5, 0.1]) {
-                    assert!(
-                        (found - half(expected)).abs() <= 1.1e-3 * expected,
-                        "{method} {tilt}: {pixel:?}"
-                    );
+                    assert_eq!(*found, half(expected), "{method} {tilt}: {pixel:?}");
                 }
             }
         }
@@ -366,8 +364,11 @@ fn energy_on_a_plane_is_kept() {
             let after: f64 = found.iter().map(|p| p[c]).sum();
             assert!((after / before - 1.0).abs() < 0.01, "{method} channel {c}: {before} to {after}");
         }
-        // And it did spread.
-        assert!(found[47 * 96 + 33][0] > 0.01 && found[47 * 96 + 47][0] < 0.99, "{method}");
+        // And it did spread: from the edge of the spot of 6 mm radius, a tenth of its red goes farther than a pixel.
+        let outside: f64 =
+            found.iter().zip(&frame.color).filter(|(_, e)| e[0] == 0.0).map(|(f, _)| f[0]).sum();
+        let total: f64 = frame.color.iter().map(|p| p[0]).sum();
+        assert!(outside > 0.1 * total && outside < 0.3 * total, "{method}: {} outside", outside / total);
     }
 }
 
@@ -465,17 +466,22 @@ fn any_zoom_gives_numbers() {
         })
     };
     for method in METHODS {
-        for (focal, depth) in [(1e-3, 1e6), (30.0, 2e4), (5e5, 11.0), (1e9, 10.5)] {
-            // The exact kernel is slow where it fills the picture; its window is bounded all the same.
-            if method == ScatterMethod::ReferenceScreen && focal > 1e3 {
-                continue;
-            }
-            let mut frame = hostile(10);
-            frame.focal_px = f64::from(focal as f32);
-            frame.depth_mm.iter_mut().for_each(|d| *d *= depth / 400.0);
-            for profile in [skin(), exponentials(1e-3), exponentials(100.0)] {
-                for p in run(&gpu, method, &profile, &frame) {
-                    assert!(p.iter().all(|v| v.is_finite() && *v >= -1e-3), "{method} {focal}: {p:?}");
+        for profile in [skin(), exponentials(1e-3), exponentials(100.0)] {
+            let mut scatter = Scatter::default();
+            scatter.prepare(&gpu, method, &profile).unwrap();
+            for (focal, depth) in [(1e-3, 1e6), (30.0, 2e4), (5e5, 11.0), (1e9, 10.5)] {
+                // The exact kernel is slow where it fills the picture; its window is bounded all the same.
+                if method == ScatterMethod::ReferenceScreen && focal > 1e3 {
+                    continue;
+                }
+                let mut frame = hostile(10);
+                frame.focal_px = f64::from(focal as f32);
+                frame.depth_mm.iter_mut().for_each(|d| *d *= depth / 400.0);
+                let found = run_with(&gpu, &frame, |r, images| {
+                    scatter.record(r, images);
+                });
+                for p in found {
+                    assert!(p.iter().all(|v| v.is_finite() && *v >= 0.0), "{method} {focal}: {p:?}");
                 }
             }
         }

@@ -21,9 +21,9 @@ fn blur(at: vec2i, center: Center) -> vec3f {
             let e_near = exp(r * inverse_d);
             let ratio = (e_far + e_far * e_far * e_far) / (e_near + e_near * e_near * e_near) * (r / far);
             let weight = tap.weight.rgb * ratio * near;
-            sum += weight * t.color;
+            sum += weight * (t.color - center.color);
             total += weight;
         }
     }
-    return select(center.color, sum / max(total, vec3f(1e-20)), total > vec3f(1e-20));
+    return center.color + select(vec3f(0.0), sum / max(total, vec3f(1e-20)), total > vec3f(1e-20));
 }

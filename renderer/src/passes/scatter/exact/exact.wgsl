@@ -1,20 +1,19 @@
-// reference-screen: the 2D kernel, pixel by pixel. taps = R (rgb, mm^-2) at radii (i / (n - 1))^2 half_width_mm.
-// Concatenated after gather.wgsl.
+// reference-screen: the 2D kernel, pixel by pixel. Concatenated after gather.wgsl.
+// taps = the profile's light in the rectangle from 0 to (x, y), rgb, for x, y = (i / (SIDE - 1))^3 half_width_mm.
 
-// Parts of a pixel on a side, where the profile is steep.
-const PARTS = 8;
-// Pixels around the centre that are cut into parts.
-const NEAR = 3;
+const SIDE = 192u;
 // Pixels from the centre to the edge of the kernel; wider ones skip pixels.
 const MOST = 256.0;
 
-fn profile_at(r_mm: f32) -> vec3f {
-    let x = sqrt(r_mm / params.half_width_mm) * f32(params.tap_count - 1u);
-    let i = u32(x);
-    if i + 1u >= params.tap_count {
-        return vec3f(0.0);
-    }
-    return mix(taps[i].weight.rgb, taps[i + 1u].weight.rgb, x - f32(i));
+// Signed light of the rectangle from the origin to a corner, mm.
+fn quadrant(corner: vec2f) -> vec3f {
+    let x = pow(min(abs(corner) / params.half_width_mm, vec2f(1.0)), vec2f(1.0 / 3.0)) * f32(SIDE - 1u);
+    let i = min(vec2u(x), vec2u(SIDE - 2u));
+    let f = x - vec2f(i);
+    let at = i.y * SIDE + i.x;
+    let low = mix(taps[at].weight.rgb, taps[at + 1u].weight.rgb, f.x);
+    let high = mix(taps[at + SIDE].weight.rgb, taps[at + SIDE + 1u].weight.rgb, f.x);
+    return sign(corner.x) * sign(corner.y) * mix(low, high, f.y);
 }
 
 fn blur(at: vec2i, center: Center) -> vec3f {
@@ -22,33 +21,21 @@ fn blur(at: vec2i, center: Center) -> vec3f {
     let reach = params.half_width_mm * center.scale;
     let stride = ceil(max(reach.x, reach.y) / MOST);
     let window = vec2i(ceil(reach / stride));
-    let cell_mm2 = mm.x * mm.y * stride * stride;
-    var sum = vec3f(0.0);
-    var arrived = vec3f(0.0);
+    var result = center.color;
     for (var y = -window.y; y <= window.y; y++) {
+        let top = (f32(y) - 0.5) * stride * mm.y;
+        let bottom = (f32(y) + 0.5) * stride * mm.y;
+        let left = (-f32(window.x) - 0.5) * stride * mm.x;
+        var before = quadrant(vec2f(left, bottom)) - quadrant(vec2f(left, top));
         for (var x = -window.x; x <= window.x; x++) {
-            if x == 0 && y == 0 {
-                continue;
-            }
+            let right = (f32(x) + 0.5) * stride * mm.x;
+            let after = quadrant(vec2f(right, bottom)) - quadrant(vec2f(right, top));
             let offset = vec2f(vec2i(x, y)) * stride;
-            var weight = vec3f(0.0);
-            if max(abs(x), abs(y)) <= NEAR {
-                for (var j = 0; j < PARTS; j++) {
-                    for (var i = 0; i < PARTS; i++) {
-                        let part = (vec2f(vec2i(i, j)) + 0.5) / f32(PARTS) - 0.5;
-                        weight += profile_at(length((offset + part * stride) * mm));
-                    }
-                }
-                weight /= f32(PARTS * PARTS);
-            } else {
-                weight = profile_at(length(offset * mm));
-            }
-            weight *= cell_mm2;
             let t = texel(at + vec2i(offset));
-            let k = weight * follow(gap_mm(center, offset, t.depth_mm), params.follow_per_mm);
-            sum += k * t.color;
-            arrived += k;
+            let k = follow(gap_mm(center, offset, t.depth_mm), params.follow_per_mm);
+            result += (after - before) * k * (t.color - center.color);
+            before = after;
         }
     }
-    return sum + center.color * (1.0 - arrived);
+    return max(result, vec3f(0.0));
 }

@@ -5,18 +5,19 @@
 //! ```
 //!
 //! What `separable:N` approximates, with the same rules for depth and tilt: the difference is the price of two
-//! one-dimensional passes and of N taps. The light of each pixel's area is R integrated over it (8 x 8 parts near the
-//! centre, where R is steep or infinite); the centre has what is left to one.
+//! one-dimensional passes and of N taps. A pixel weighs the light of its area, from a table of the light in rectangles:
+//! right for steep profiles, and the weights sum to one whatever the size of a pixel.
 //!
 //! Costs the square of the kernel's width in pixels. A kernel that reaches over more than 256 pixels skips pixels.
 
+use rayon::prelude::*;
 use rubor_rig::skin::profile::Profile;
 
 use super::gather::{Gather, Tap};
 use crate::gpu::Gpu;
 
-/// Entries of the table of R.
-const ENTRIES: usize = 1024;
+/// Corners of the table on a side; `SIDE` of exact.wgsl.
+const SIDE: usize = 192;
 /// Share of the widest channel's light inside of the kernel.
 const COVERAGE: f64 = 0.9995;
 
@@ -31,14 +32,13 @@ pub(crate) fn half_width_mm(profile: &Profile) -> f64 {
 /// The method for one profile.
 pub(crate) fn gather(gpu: &Gpu, profile: &Profile) -> Gather {
     let half_width = half_width_mm(profile);
-    let total = profile.total();
-    let taps: Vec<Tap> = (0..ENTRIES)
+    let place = |i: usize| half_width * (i as f64 / (SIDE - 1) as f64).powi(3);
+    let taps: Vec<Tap> = (0..SIDE * SIDE)
+        .into_par_iter()
         .map(|i| {
-            // Half an entry instead of 0, where R may be infinite.
-            let x = (i as f64).max(0.5) / (ENTRIES - 1) as f64;
-            let r = profile.reflectance(half_width * x * x);
-            let weight = [0, 1, 2].map(|c| (r[c] / total[c]) as f32);
-            Tap { place: [0.0; 4], weight: [weight[0], weight[1], weight[2], 0.0] }
+            let (x, y) = (place(i % SIDE), place(i / SIDE));
+            let light = profile.channels.each_ref().map(|c| c.quadrant_cdf(x, y) as f32);
+            Tap { place: [0.0; 4], weight: [light[0], light[1], light[2], 0.0] }
         })
         .collect();
     Gather::new(gpu, METHOD, &taps, half_width as f32, half_width as f32, [0.0; 4])

@@ -1,8 +1,7 @@
 // screen-jitter: a sum over fixed taps. place.xy = mm, weight = rgb. Concatenated after gather.wgsl.
 
 fn blur(at: vec2i, center: Center) -> vec3f {
-    var sum = vec3f(0.0);
-    var arrived = vec3f(0.0);
+    var result = center.color;
     for (var i = 0u; i < params.tap_count; i++) {
         let tap = taps[i];
         let offset = clamp(tap.place.xy * center.scale, vec2f(-MAX_REACH), vec2f(MAX_REACH));
@@ -14,9 +13,8 @@ fn blur(at: vec2i, center: Center) -> vec3f {
             let there = low + side;
             let t = texel(at + vec2i(there));
             let k = share.x * share.y * follow(gap_mm(center, there, t.depth_mm), params.follow_per_mm);
-            sum += tap.weight.rgb * k * t.color;
-            arrived += tap.weight.rgb * k;
+            result += tap.weight.rgb * k * (t.color - center.color);
         }
     }
-    return sum + center.color * (1.0 - arrived);
+    return result;
 }

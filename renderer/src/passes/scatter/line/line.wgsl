@@ -67,7 +67,7 @@ fn depth_at(at: vec2i, strength: f32) -> f32 {
 fn put(at: vec2i, color: vec4f) {
     textureStore(target_image, at, color);
     //ACCUMULATE let before = textureLoad(sum_before, at, 0);
-    //ACCUMULATE textureStore(sum_after, at, vec4f(mix(before.rgb, color.rgb, params.share.rgb), color.a));
+    //ACCUMULATE textureStore(sum_after, at, vec4f(before.rgb + params.share.rgb * (color.rgb - before.rgb), color.a));
 }
 
 @compute @workgroup_size(THREADS)
@@ -140,11 +140,12 @@ fn scatter_untiled(@builtin(global_invocation_id) id: vec3u) {
     put(at, blur_image(at));
 }
 
-// Light of a texel, faded by its distance from the tangent plane: rgb, and how much of it arrived.
-fn tile_texel(s: u32, expected_mm: f32, share: f32) -> vec4f {
+// What a texel changes at the centre, faded by its distance from the tangent plane. Differences keep even light even to
+// the last bit.
+fn tile_change(s: u32, center: vec3f, expected_mm: f32, share: f32) -> vec3f {
     let k = share * follow(depths_mm[s] - expected_mm, params.follow_per_mm);
     let c = colors[s];
-    return k * vec4f(unpack2x16float(c.x), unpack2x16float(c.y).x, 1.0);
+    return k * (vec3f(unpack2x16float(c.x), unpack2x16float(c.y).x) - center);
 }
 
 fn blur_tile(local: vec2u, span: u32) -> vec4f {
@@ -158,8 +159,7 @@ fn blur_tile(local: vec2u, span: u32) -> vec4f {
     }
     let slope = surface_slope(depths_mm[s - stride], here, depths_mm[s + stride], per_mm);
     let scale = c.a * per_mm * foreshortening(slope, per_mm);
-    var sum = vec3f(0.0);
-    var arrived = vec3f(0.0);
+    var result = c.rgb;
     for (var i = 0u; i < params.pair_count; i++) {
         let pair = params.pairs[i];
         let x = pair.w * scale;
@@ -168,20 +168,19 @@ fn blur_tile(local: vec2u, span: u32) -> vec4f {
         let step = u32(whole) * stride;
         let rise = slope * whole;
         // Two texels on the line on either side, weighted by distance.
-        let light = tile_texel(s + step, here + rise, 1.0 - fraction)
-            + tile_texel(s + step + stride, here + rise + slope, fraction)
-            + tile_texel(s - step, here - rise, 1.0 - fraction)
-            + tile_texel(s - step - stride, here - rise - slope, fraction);
-        sum += pair.rgb * light.rgb;
-        arrived += pair.rgb * light.a;
+        let change = tile_change(s + step, c.rgb, here + rise, 1.0 - fraction)
+            + tile_change(s + step + stride, c.rgb, here + rise + slope, fraction)
+            + tile_change(s - step, c.rgb, here - rise, 1.0 - fraction)
+            + tile_change(s - step - stride, c.rgb, here - rise - slope, fraction);
+        result += pair.rgb * change;
     }
-    return vec4f(sum + c.rgb * (1.0 - arrived), c.a);
+    return vec4f(result, c.a);
 }
 
-fn image_texel(at: vec2i, expected_mm: f32, share: f32) -> vec4f {
+fn image_change(at: vec2i, center: vec3f, expected_mm: f32, share: f32) -> vec3f {
     let p = clamp(at, vec2i(0), vec2i(view.size) - 1);
     let c = color_at(p);
-    return share * follow(depth_at(p, c.a) - expected_mm, params.follow_per_mm) * vec4f(c.rgb, 1.0);
+    return share * follow(depth_at(p, c.a) - expected_mm, params.follow_per_mm) * (c.rgb - center);
 }
 
 fn image_depth(at: vec2i) -> f32 {
@@ -199,8 +198,7 @@ fn blur_image(at: vec2i) -> vec4f {
     }
     let slope = surface_slope(image_depth(at - stride), here, image_depth(at + stride), per_mm);
     let scale = c.a * per_mm * foreshortening(slope, per_mm);
-    var sum = vec3f(0.0);
-    var arrived = vec3f(0.0);
+    var result = c.rgb;
     for (var i = 0u; i < params.pair_count; i++) {
         let pair = params.pairs[i];
         let x = min(pair.w * scale, MAX_REACH);
@@ -208,12 +206,11 @@ fn blur_image(at: vec2i) -> vec4f {
         let fraction = x - whole;
         let step = i32(whole) * stride;
         let rise = slope * whole;
-        let light = image_texel(at + step, here + rise, 1.0 - fraction)
-            + image_texel(at + step + stride, here + rise + slope, fraction)
-            + image_texel(at - step, here - rise, 1.0 - fraction)
-            + image_texel(at - step - stride, here - rise - slope, fraction);
-        sum += pair.rgb * light.rgb;
-        arrived += pair.rgb * light.a;
+        let change = image_change(at + step, c.rgb, here + rise, 1.0 - fraction)
+            + image_change(at + step + stride, c.rgb, here + rise + slope, fraction)
+            + image_change(at - step, c.rgb, here - rise, 1.0 - fraction)
+            + image_change(at - step - stride, c.rgb, here - rise - slope, fraction);
+        result += pair.rgb * change;
     }
-    return vec4f(sum + c.rgb * (1.0 - arrived), c.a);
+    return vec4f(result, c.a);
 }
