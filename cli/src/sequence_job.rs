@@ -8,16 +8,16 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
-use rubor_renderer::{Gpu, Image, Renderer, Settings, antialias};
+use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, Settings, antialias};
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
-use rubor_rig::skin::kernel::SeparableKernel;
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::timeline::Sequence;
 use serde_json::json;
@@ -42,9 +42,10 @@ pub(crate) struct Arguments {
     /// Frames a second [default: the sequence's]
     #[arg(long)]
     pub(crate) fps: Option<f64>,
-    /// Subsurface scattering: none, or separable:N with an odd N from 5 to 65
-    #[arg(long, default_value = "separable:17", value_parser = parse_scatter, value_name = "METHOD")]
-    pub(crate) scatter: Scatter,
+    /// Subsurface scattering: none, separable:N (N odd, 5 to 65), screen-gauss:4, screen-gauss:6, screen-jitter,
+    /// burley-disk:N (N from 4 to 256), reference-screen, reference-surface
+    #[arg(long, default_value = "separable:17", value_name = "METHOD")]
+    pub(crate) scatter: ScatterMethod,
     /// Antialiasing: none, mlaa, smaa-1x, smaa-s2x, smaa-t2x, smaa-4x, or ssaa:N with N x N samples a pixel
     #[arg(long, default_value = "smaa-s2x", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
@@ -71,13 +72,6 @@ pub(crate) struct Arguments {
     pub(crate) json: bool,
 }
 
-/// A scattering method by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Scatter {
-    None,
-    Separable(usize),
-}
-
 /// An antialiasing method by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Antialias {
@@ -102,17 +96,6 @@ fn parse_frames(text: &str) -> Result<FrameList, String> {
         numbers.extend(first..=last);
     }
     Ok(FrameList(numbers.into_iter().collect()))
-}
-
-fn parse_scatter(text: &str) -> Result<Scatter, String> {
-    if text == "none" {
-        return Ok(Scatter::None);
-    }
-    let samples = text.strip_prefix("separable:").and_then(|n| n.parse().ok());
-    match samples {
-        Some(n) if n % 2 == 1 && (5..=65).contains(&n) => Ok(Scatter::Separable(n)),
-        _ => Err(format!("found {text:?}, expected none, or separable:N with an odd N from 5 to 65")),
-    }
 }
 
 fn parse_antialias(text: &str) -> Result<Antialias, String> {
@@ -222,7 +205,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         "size": size,
         "frames": frames.len(),
         "framesDrawn": drawn.len(),
-        "scatter": format!("{:?}", arguments.scatter),
+        "scatter": arguments.scatter.to_string(),
         "antialias": format!("{:?}", arguments.antialias),
         "secondsToFirstFrame": first_frame_s,
         "secondsPerFrame": median(&mut drawn),
@@ -252,17 +235,14 @@ fn chosen_frames(count: u32, list: Option<&FrameList>) -> Outcome<Vec<u32>> {
 }
 
 fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
-    let scatter = match arguments.scatter {
-        Scatter::None => None,
-        Scatter::Separable(n) => Some(SeparableKernel::of(&Profile::deon_six(), n).map_err(Failure::input)?),
-    };
     let (mode, supersampling) = match arguments.antialias {
         Antialias::Filter(mode) => (mode, 1),
         Antialias::Supersampling(n) => (antialias::Mode::None, n),
     };
     Ok(Settings {
         size,
-        scatter,
+        scatter: arguments.scatter,
+        profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(mode, antialias::Preset::High),
         supersampling,
         shadow_size: 2048,
@@ -277,7 +257,7 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
         "rig": job.rig,
         "sequence": job.sequence,
         "size": size,
-        "scatter": format!("{:?}", arguments.scatter),
+        "scatter": arguments.scatter.to_string(),
         "antialias": format!("{:?}", arguments.antialias),
         "exposure": arguments.exposure,
         "program": env!("CARGO_PKG_VERSION"),
@@ -415,11 +395,6 @@ mod tests {
 
     #[test]
     fn methods_are_read_by_name() {
-        assert_eq!(parse_scatter("separable:17"), Ok(Scatter::Separable(17)));
-        assert_eq!(parse_scatter("none"), Ok(Scatter::None));
-        for wrong in ["separable:16", "separable:67", "separable", "gauss"] {
-            assert!(parse_scatter(wrong).unwrap_err().contains(wrong));
-        }
         assert_eq!(parse_antialias("ssaa:4"), Ok(Antialias::Supersampling(4)));
         assert!(parse_antialias("ssaa:0").is_err());
         assert_eq!(parse_frames("3, 1-2,2"), Ok(FrameList(vec![1, 2, 3])));

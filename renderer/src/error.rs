@@ -40,6 +40,9 @@ pub enum RenderError {
     /// Antialiasing settings out of range.
     #[error(transparent)]
     Antialias(#[from] crate::passes::antialias::AntialiasError),
+    /// The diffusion profile or a kernel of it is out of range.
+    #[error(transparent)]
+    Skin(#[from] rubor_rig::error::SkinError),
     /// The device stopped answering or ran out of memory.
     #[error("the device failed: {0}")]
     Lost(String),

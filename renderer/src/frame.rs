@@ -1,7 +1,9 @@
 //! A frame: every pass, in order, and the images between them.
 
+use std::sync::Arc;
+
 use glam::{Mat4, Vec3};
-use rubor_rig::skin::kernel::SeparableKernel;
+use rubor_rig::skin::profile::Profile;
 use serde::Serialize;
 
 use crate::error::RenderError;
@@ -13,7 +15,7 @@ use crate::passes::compose::Compose;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
 use crate::passes::overlay::Overlay;
-use crate::passes::scatter::Scatter;
+use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
 use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded};
 use crate::passes::shadow::{LightView, Shadow};
 use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
@@ -26,8 +28,10 @@ use crate::scene::{Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
 pub struct Settings {
     /// Pixels of the image.
     pub size: [u32; 2],
-    /// Scattering kernel; without one light does not scatter.
-    pub scatter: Option<SeparableKernel>,
+    /// How light scatters in skin.
+    pub scatter: ScatterMethod,
+    /// How far it does, for every method.
+    pub profile: Arc<Profile>,
     /// Antialiasing of the displayed image.
     pub antialias: antialias::Settings,
     /// Pixels of the frame on a side of a pixel of the image (1 to 8): `ssaa`.
@@ -237,7 +241,7 @@ impl Renderer {
             shadow: Shadow::new(&gpu),
             visibility: Visibility::new(&gpu),
             shade: Shade::new(&gpu),
-            scatter: Scatter::new(&gpu),
+            scatter: Scatter::default(),
             compose: Compose::new(&gpu),
             overlay: Overlay::new(&gpu),
             display: Display::new(&gpu),
@@ -287,6 +291,7 @@ impl Renderer {
             self.antialias = Some(Antialias::new(&self.gpu, &settings.antialias, settings.size, format)?);
         }
         self.fit_instances(scene);
+        self.scatter.prepare(&self.gpu, settings.scatter, &settings.profile)?;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.record_frame(&mut encoder, scene, settings)?;
         self.gpu.queue.submit([encoder.finish()]);
@@ -489,12 +494,14 @@ impl Renderer {
                 self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
             }
 
-            let mut diffuse = &targets.irradiance;
-            if let Some(kernel) = &settings.scatter {
-                let images = [&targets.irradiance, &targets.scratch, &targets.scattered];
-                self.scatter.record(gpu, encoder, timer, &view, kernel, &sample.depth, images);
-                diffuse = &targets.scattered;
-            }
+            let images = Images {
+                irradiance: &targets.irradiance,
+                depth: &sample.depth,
+                scratch: &targets.scratch,
+                scattered: &targets.scattered,
+            };
+            let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view: &view };
+            let diffuse = self.scatter.record(recorder, &images);
 
             let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
             self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);

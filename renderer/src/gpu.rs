@@ -157,6 +157,27 @@ impl Gpu {
         })
     }
 
+    /// As [`Gpu::compute_pipeline`], for a shader that writes its workgroup memory before it reads it.
+    pub fn compute_pipeline_without_clear(
+        &self,
+        label: &str,
+        wgsl: &str,
+        entry: &str,
+    ) -> wgpu::ComputePipeline {
+        let module = self.shader(label, wgsl);
+        self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(label),
+            layout: None,
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        })
+    }
+
     /// A shader module from WGSL.
     pub fn shader(&self, label: &str, wgsl: &str) -> wgpu::ShaderModule {
         self.device.create_shader_module(wgpu::ShaderModuleDescriptor {

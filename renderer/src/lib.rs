@@ -38,4 +38,5 @@ pub use head::{
     ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
 };
 pub use passes::antialias;
+pub use passes::scatter::ScatterMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

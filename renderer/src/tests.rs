@@ -1,23 +1,24 @@
 //! Shaders against Rust, kernels against the CPU, and what every frame keeps to.
 
+use std::sync::Arc;
+
 use glam::{Mat4, Quat, Vec2, Vec3};
 use rubor_rig::deform;
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{BlendShape, Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
 use rubor_rig::map::Map;
-use rubor_rig::skin::kernel::SeparableKernel;
 use rubor_rig::skin::profile::Profile;
 
 use crate::frame::View;
 use crate::head::GpuVertex;
 use crate::passes::{
-    antialias, appearance, compose, display, morph, overlay, scatter, shade, shadow, surface_frames,
-    velocity, visibility,
+    antialias, appearance, compose, display, morph, overlay, shade, shadow, surface_frames, velocity,
+    visibility,
 };
 use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
 use crate::{
     Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
-    Renderer, Scene, Settings,
+    Renderer, ScatterMethod, Scene, Settings,
 };
 
 #[test]
@@ -31,7 +32,6 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     assert_eq!(validated_workgroups(compose::SHADER), square("compose"));
     assert_eq!(validated_workgroups(display::SHADER), square("display"));
     assert_eq!(validated_workgroups(velocity::SHADER), square("velocity_main"));
-    assert_eq!(validated_workgroups(scatter::SEPARABLE), square("scatter"));
     for raster in [shadow::SHADER, visibility::SHADER, overlay::SHADER] {
         assert_eq!(validated_workgroups(raster), []);
     }
@@ -85,13 +85,6 @@ fn structs_are_laid_out_alike_on_both_sides() {
             environment_intensity as "environment_intensity", environment_levels as "environment_levels",
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", hair_color as "hair_color",
             is_second_sample as "is_second_sample", harmonics as "harmonics", lights as "lights"),
-    );
-    assert_layout(
-        scatter::SEPARABLE,
-        "Params",
-        size_of::<scatter::Params>(),
-        &offsets!(scatter::Params; direction as "direction", sample_count as "sample_count",
-            follow_per_mm as "follow_per_mm", samples as "samples"),
     );
     assert_layout(
         overlay::SHADER,
@@ -173,7 +166,8 @@ fn renderer() -> Option<Renderer> {
 fn settings(size: [u32; 2]) -> Settings {
     Settings {
         size,
-        scatter: Some(SeparableKernel::of(&Profile::deon_six(), 17).expect("17 is a valid count")),
+        scatter: ScatterMethod::Separable(17),
+        profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
         supersampling: 1,
         shadow_size: 256,

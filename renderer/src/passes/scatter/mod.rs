@@ -1,96 +1,120 @@
 //! Subsurface scattering in screen space: diffuse radiance of a white surface, blurred by the diffusion profile.
 //!
 //! ```text
-//! irradiance (a = strength), depth --horizontal--> scratch --vertical--> scattered
+//! irradiance (a = strength), depth --the method of the frame--> scattered (rgba16f, linear Rec. 709)
 //! ```
 //!
-//! `separable`: two passes of one 1D kernel (Jimenez et al. 2015; papers/004 ch. 6). The kernel is in millimetres on
-//! the surface and is projected with the depth and field of view of each pixel; a neighbour at another depth, or one
-//! that is not skin, counts as the centre (papers/004 section 4, "follow the surface").
+//! Each method is a file or folder of its own: `separable`, `gauss`, `jitter`, `disk`, and the reference `exact`.
+//! All keep to the same rules: kernels are in millimetres on the surface, projected with the depth, field of view and
+//! tilt at each pixel and scaled by its strength; a neighbour off the tangent plane of the centre, or one that is not
+//! skin, gives way to the centre; a pixel whose kernel is under half a pixel keeps its light; weights sum to one, so
+//! even light stays even.
 //!
-//! Does not: scatter across depth steps, or through thin parts (that is transmittance).
+//! Does not: scatter across depth steps, or through thin parts (that is transmittance, in `shade`).
 
-use rubor_rig::skin::kernel::SeparableKernel;
+use std::sync::Arc;
 
+use rubor_rig::skin::profile::Profile;
+
+use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
 
-/// WGSL of the pass.
-pub(crate) const SEPARABLE: &str =
-    concat!(include_str!("../../shared/view.wgsl"), include_str!("separable.wgsl"));
+pub(crate) mod disk;
+pub(crate) mod exact;
+pub(crate) mod gather;
+pub(crate) mod gauss;
+pub(crate) mod jitter;
+pub(crate) mod line;
+mod method;
+pub(crate) mod separable;
 
-/// Samples that a kernel can have.
-pub(crate) const MAX_SAMPLES: usize = 65;
+#[cfg(test)]
+mod reference;
+#[cfg(test)]
+mod tests;
 
-/// Share of a neighbour that is given back to the centre for each millimetre of depth between the two. A step of 4 mm
-/// (lip over teeth, wing of the nose over cheek) separates fully; the slope of a cheek does not.
-const FOLLOW_PER_MM: f32 = 0.25;
+pub use method::ScatterMethod;
 
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-pub(crate) struct Params {
-    pub(crate) direction: [f32; 2],
-    pub(crate) sample_count: u32,
-    pub(crate) follow_per_mm: f32,
-    pub(crate) samples: [[f32; 4]; MAX_SAMPLES],
+/// Share of a neighbour that is given back to the centre for each millimetre that it is off the centre's tangent plane.
+/// A step of 4 mm (lip over teeth, wing of the nose over cheek) separates fully; the curve of a cheek does not.
+pub(crate) const FOLLOW_PER_MM: f32 = 0.25;
+
+/// What recording needs.
+pub(crate) struct Recorder<'a> {
+    pub(crate) gpu: &'a Gpu,
+    pub(crate) encoder: &'a mut wgpu::CommandEncoder,
+    pub(crate) timer: &'a mut PassTimer,
+    pub(crate) view: &'a wgpu::Buffer,
 }
 
-/// The pipeline of the pass.
+/// Images of the frame that methods read and write.
+pub(crate) struct Images<'a> {
+    pub(crate) irradiance: &'a wgpu::TextureView,
+    pub(crate) depth: &'a wgpu::TextureView,
+    pub(crate) scratch: &'a wgpu::TextureView,
+    pub(crate) scattered: &'a wgpu::TextureView,
+}
+
+enum Prepared {
+    Separable(separable::Separable),
+    ScreenGauss(gauss::ScreenGauss),
+    Gather(gather::Gather),
+}
+
+/// The method of the last frame, with its pipelines and kernels; nothing before the first frame that scatters.
+#[derive(Default)]
 pub(crate) struct Scatter {
-    pipeline: wgpu::ComputePipeline,
+    key: Option<(ScatterMethod, Arc<Profile>)>,
+    prepared: Option<Prepared>,
 }
 
 impl Scatter {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
-        Self { pipeline: gpu.compute_pipeline("scatter", SEPARABLE, "scatter") }
+    /// Makes pipelines and kernels for a method and a profile, unless they are there.
+    ///
+    /// # Errors
+    /// The method's number is out of range, or the profile cannot be fitted.
+    pub(crate) fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        method: ScatterMethod,
+        profile: &Arc<Profile>,
+    ) -> Result<(), RenderError> {
+        if self.key.as_ref().is_some_and(|(m, p)| *m == method && p == profile) {
+            return Ok(());
+        }
+        self.key = None;
+        self.prepared = match method.validate()? {
+            ScatterMethod::None | ScatterMethod::ReferenceSurface(_) => None,
+            ScatterMethod::Separable(n) => {
+                Some(Prepared::Separable(separable::Separable::new(gpu, profile, n as usize)?))
+            }
+            ScatterMethod::ScreenGauss(n) => {
+                Some(Prepared::ScreenGauss(gauss::ScreenGauss::new(gpu, profile, n as usize)?))
+            }
+            ScatterMethod::ScreenJitter => Some(Prepared::Gather(jitter::gather(gpu, profile))),
+            ScatterMethod::BurleyDisk(n) => Some(Prepared::Gather(disk::gather(gpu, profile, n as usize)?)),
+            ScatterMethod::ReferenceScreen => Some(Prepared::Gather(exact::gather(gpu, profile))),
+        };
+        self.key = Some((method, profile.clone()));
+        Ok(())
     }
 
-    /// Blurs `irradiance` into `scattered` by way of `scratch`.
-    pub(crate) fn record(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        timer: &mut PassTimer,
-        view: &wgpu::Buffer,
-        kernel: &SeparableKernel,
-        depth: &wgpu::TextureView,
-        [irradiance, scratch, scattered]: [&wgpu::TextureView; 3],
-    ) {
-        let steps = [
-            ("scatter horizontal", [1.0, 0.0], irradiance, scratch),
-            ("scatter vertical", [0.0, 1.0], scratch, scattered),
-        ];
-        for (name, direction, from, to) in steps {
-            let params = gpu.uniform(name, &params(kernel, direction));
-            let group = gpu.bind(
-                name,
-                &self.pipeline,
-                0,
-                &[
-                    view.as_entire_binding(),
-                    params.as_entire_binding(),
-                    wgpu::BindingResource::TextureView(from),
-                    wgpu::BindingResource::TextureView(depth),
-                    wgpu::BindingResource::TextureView(to),
-                ],
-            );
-            let mut pass = timer.compute(encoder, name);
-            pass.set_pipeline(&self.pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            let size = to.texture().size();
-            pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+    /// Blurs `irradiance` into `scattered` (or not at all) and says where the result is.
+    pub(crate) fn record<'a>(&mut self, mut r: Recorder<'_>, images: &Images<'a>) -> &'a wgpu::TextureView {
+        match &mut self.prepared {
+            None => return images.irradiance,
+            Some(Prepared::Separable(m)) => m.record(&mut r, images),
+            Some(Prepared::ScreenGauss(m)) => m.record(&mut r, images),
+            Some(Prepared::Gather(m)) => m.record(&mut r, images),
         }
+        images.scattered
     }
 }
 
-/// The kernel as the shader reads it: the centre first.
-fn params(kernel: &SeparableKernel, direction: [f32; 2]) -> Params {
-    let n = kernel.offsets_mm.len().min(MAX_SAMPLES);
-    let middle = n / 2;
-    let order = std::iter::once(middle).chain((0..n).filter(|i| *i != middle));
-    let mut samples = [[0.0; 4]; MAX_SAMPLES];
-    for (slot, i) in samples.iter_mut().zip(order) {
-        let [r, g, b] = kernel.weights[i].map(|w| w as f32);
-        *slot = [r, g, b, kernel.offsets_mm[i] as f32];
-    }
-    Params { direction, sample_count: n as u32, follow_per_mm: FOLLOW_PER_MM, samples }
+/// An image between passes.
+pub(crate) fn half_image(gpu: &Gpu, label: &str, size: [u32; 2]) -> wgpu::TextureView {
+    let usage = wgpu::TextureUsages::STORAGE_BINDING
+        | wgpu::TextureUsages::TEXTURE_BINDING
+        | wgpu::TextureUsages::COPY_SRC;
+    gpu.target(label, size, wgpu::TextureFormat::Rgba16Float, usage).create_view(&Default::default())
 }

@@ -1,0 +1,161 @@
+//! The methods on the CPU, in f64 and from their equations; the truth of the parity tests.
+
+use super::gather::Tap;
+
+/// Share of a neighbour lost for a millimetre off the tangent plane.
+const FOLLOW_PER_MM: f64 = super::FOLLOW_PER_MM as f64;
+
+/// Inputs of the methods. Depth is infinite where there is no skin.
+#[derive(Clone)]
+pub(crate) struct Frame {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Pixels a radian.
+    pub(crate) focal_px: f64,
+    pub(crate) color: Vec<[f64; 3]>,
+    pub(crate) strength: Vec<f64>,
+    pub(crate) depth_mm: Vec<f64>,
+}
+
+/// The tangent plane of a pixel and the scale of its kernel.
+struct Center {
+    color: [f64; 3],
+    depth_mm: f64,
+    slope: [f64; 2],
+    scale: [f64; 2],
+}
+
+impl Frame {
+    fn index(&self, x: i64, y: i64) -> usize {
+        let x = x.clamp(0, self.width as i64 - 1) as usize;
+        let y = y.clamp(0, self.height as i64 - 1) as usize;
+        y * self.width + x
+    }
+
+    fn per_mm(&self, i: usize) -> f64 {
+        self.focal_px / self.depth_mm[i]
+    }
+
+    fn is_sharp(&self, i: usize, visible_mm: f64) -> bool {
+        self.strength[i] <= 0.0 || self.strength[i] * self.per_mm(i) * visible_mm < 0.5
+    }
+
+    /// Depth change to the next pixel along an axis: the smaller of both sides, 0 where the surface breaks.
+    fn slope(&self, x: i64, y: i64, axis: usize) -> f64 {
+        let (dx, dy) = if axis == 0 { (1, 0) } else { (0, 1) };
+        let here = self.depth_mm[self.index(x, y)];
+        let before = here - self.depth_mm[self.index(x - dx, y - dy)];
+        let after = self.depth_mm[self.index(x + dx, y + dy)] - here;
+        let slope = if before.abs() < after.abs() { before } else { after };
+        if slope.abs() * self.per_mm(self.index(x, y)) <= 4.0 { slope } else { 0.0 }
+    }
+
+    fn center(&self, x: i64, y: i64) -> Center {
+        let i = self.index(x, y);
+        let slope = [self.slope(x, y, 0), self.slope(x, y, 1)];
+        let per_mm = self.per_mm(i);
+        let scale = slope.map(|s| self.strength[i] * per_mm / (1.0 + (s * per_mm).powi(2)).sqrt());
+        Center { color: self.color[i], depth_mm: self.depth_mm[i], slope, scale }
+    }
+
+    /// Share of the light of a pixel that reaches the centre from an offset in pixels.
+    fn arrives(&self, center: &Center, i: usize, offset: [f64; 2]) -> f64 {
+        let plane = center.depth_mm + center.slope[0] * offset[0] + center.slope[1] * offset[1];
+        let gap = (self.depth_mm[i] - plane).abs();
+        if gap.is_finite() { (1.0 - FOLLOW_PER_MM * gap).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
+    fn map(&self, f: impl Fn(i64, i64) -> [f64; 3]) -> Self {
+        let color = (0..self.width * self.height)
+            .map(|i| f((i % self.width) as i64, (i / self.width) as i64))
+            .collect();
+        Self { color, ..self.clone() }
+    }
+
+    /// One direction of a kernel: taps on one side and their mirror images, linear between pixels.
+    pub(crate) fn line(&self, side: &[([f64; 3], f64)], visible_mm: f64, axis: usize) -> Self {
+        self.map(|x, y| {
+            let i = self.index(x, y);
+            if self.is_sharp(i, visible_mm) {
+                return self.color[i];
+            }
+            let center = self.center(x, y);
+            let mut result = center.color;
+            for (weight, offset_mm) in side {
+                for sign in [-1.0, 1.0] {
+                    let along = sign * offset_mm * center.scale[axis];
+                    let low = along.floor();
+                    for (pixel, share) in [(low, 1.0 - (along - low)), (low + 1.0, along - low)] {
+                        let step = pixel as i64;
+                        let j = if axis == 0 { self.index(x + step, y) } else { self.index(x, y + step) };
+                        let offset = if axis == 0 { [pixel, 0.0] } else { [0.0, pixel] };
+                        let k = share * self.arrives(&center, j, offset);
+                        for c in 0..3 {
+                            result[c] += weight[c] * k * (self.color[j][c] - center.color[c]);
+                        }
+                    }
+                }
+            }
+            result
+        })
+    }
+
+    /// A weighted mean with another image, channel by channel.
+    pub(crate) fn mix(&self, other: &Self, share: [f64; 3]) -> Self {
+        self.map(|x, y| {
+            let i = self.index(x, y);
+            std::array::from_fn(|c| self.color[i][c] + share[c] * (other.color[i][c] - self.color[i][c]))
+        })
+    }
+
+    /// Fixed taps in millimetres, bilinear between pixels.
+    pub(crate) fn jitter(&self, taps: &[Tap], visible_mm: f64) -> Self {
+        self.map(|x, y| {
+            let i = self.index(x, y);
+            if self.is_sharp(i, visible_mm) {
+                return self.color[i];
+            }
+            let center = self.center(x, y);
+            let mut result = center.color;
+            for tap in taps {
+                let offset: [f64; 2] = std::array::from_fn(|a| f64::from(tap.place[a]) * center.scale[a]);
+                for (cx, cy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+                    let there = [offset[0].floor() + cx, offset[1].floor() + cy];
+                    let share = (1.0 - (offset[0] - there[0]).abs()) * (1.0 - (offset[1] - there[1]).abs());
+                    let j = self.index(x + there[0] as i64, y + there[1] as i64);
+                    let k = share * self.arrives(&center, j, there);
+                    for c in 0..3 {
+                        result[c] += f64::from(tap.weight[c]) * k * (self.color[j][c] - center.color[c]);
+                    }
+                }
+            }
+            result
+        })
+    }
+
+    /// The 2D kernel: `light(x0, y0, x1, y1)` is the profile's light in a rectangle in mm.
+    pub(crate) fn exact(&self, half_width_mm: f64, light: &dyn Fn(f64, f64, f64, f64) -> [f64; 3]) -> Self {
+        self.map(|x, y| {
+            let i = self.index(x, y);
+            if self.is_sharp(i, half_width_mm) {
+                return self.color[i];
+            }
+            let center = self.center(x, y);
+            let reach = center.scale.map(|s| (half_width_mm * s).ceil() as i64);
+            let mut result = center.color;
+            for dy in -reach[1]..=reach[1] {
+                for dx in -reach[0]..=reach[0] {
+                    let offset = [dx as f64, dy as f64];
+                    let edge = |a: usize, half: f64| (offset[a] + half) / center.scale[a];
+                    let weight = light(edge(0, -0.5), edge(1, -0.5), edge(0, 0.5), edge(1, 0.5));
+                    let j = self.index(x + dx, y + dy);
+                    let k = self.arrives(&center, j, offset);
+                    for c in 0..3 {
+                        result[c] += weight[c] * k * (self.color[j][c] - center.color[c]);
+                    }
+                }
+            }
+            result
+        })
+    }
+}

@@ -1,0 +1,499 @@
+use std::sync::Arc;
+
+use glam::Mat4;
+use half::f16;
+use rubor_rig::skin::kernel::SeparableKernel;
+use rubor_rig::skin::profile::{Profile, RadialProfile};
+
+use super::reference::Frame;
+use super::*;
+use crate::frame::View;
+
+/// Distance of the near plane of test views, metres.
+const NEAR: f32 = 0.01;
+
+/// Every method that needs only a frame.
+const METHODS: [ScatterMethod; 6] = [
+    ScatterMethod::Separable(17),
+    ScatterMethod::ScreenGauss(4),
+    ScatterMethod::ScreenGauss(6),
+    ScatterMethod::ScreenJitter,
+    ScatterMethod::BurleyDisk(16),
+    ScatterMethod::ReferenceScreen,
+];
+
+/// xorshift64*: 0 to 1.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// A device, or a loud note why there is none.
+fn gpu() -> Option<Gpu> {
+    match Gpu::new(None) {
+        Ok(gpu) => Some(gpu),
+        Err(e) if std::env::var_os("RUBOR_REQUIRE_GPU").is_some() => panic!("{e}"),
+        Err(e) => {
+            eprintln!("SKIPPED: no graphics adapter, so the scattering passes were not run: {e}");
+            None
+        }
+    }
+}
+
+fn half(v: f64) -> f64 {
+    f16::from_f64(v).to_f64()
+}
+
+impl Frame {
+    fn new(size: [usize; 2], focal_px: f64, at: impl Fn(usize, usize) -> ([f64; 3], f64, f64)) -> Self {
+        let mut frame = Self {
+            width: size[0],
+            height: size[1],
+            focal_px: f64::from(focal_px as f32),
+            color: Vec::new(),
+            strength: Vec::new(),
+            depth_mm: Vec::new(),
+        };
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let (color, strength, depth_mm) = at(x, y);
+                let strength = half(strength);
+                frame.color.push(color.map(half));
+                frame.strength.push(strength);
+                let depth = 1000.0 * NEAR / depth_mm as f32;
+                let is_skin = strength > 0.0 && depth > 0.0;
+                frame.depth_mm.push(if is_skin { f64::from(1000.0 * NEAR / depth) } else { f64::INFINITY });
+            }
+        }
+        frame
+    }
+
+    fn view(&self) -> View {
+        let mut view: View = bytemuck::Zeroable::zeroed();
+        view.clip_from_world = Mat4::IDENTITY;
+        view.origin = [0.0, 0.0, 0.0, self.focal_px as f32];
+        view.size = [self.width as u32, self.height as u32];
+        view.near = NEAR;
+        view
+    }
+}
+
+/// A depth image can only be drawn.
+fn draw_depth(gpu: &Gpu, frame: &Frame) -> wgpu::TextureView {
+    let shader = gpu.shader(
+        "test depth",
+        "@group(0) @binding(0) var<storage, read> depths: array<f32>;
+         @group(0) @binding(1) var<storage, read> width: array<u32>;
+         @vertex fn corner(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+             return vec4f(vec2f(f32(i & 1u), f32(i >> 1u)) * 4.0 - 1.0, 0.0, 1.0);
+         }
+         @fragment fn depth(@builtin(position) p: vec4f) -> @builtin(frag_depth) f32 {
+             return depths[u32(p.y) * width[0] + u32(p.x)];
+         }",
+    );
+    let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("test depth"),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &shader,
+            entry_point: Some("corner"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: wgpu::TextureFormat::Depth32Float,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Always),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &shader,
+            entry_point: Some("depth"),
+            compilation_options: Default::default(),
+            targets: &[],
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+    let size = [frame.width as u32, frame.height as u32];
+    let view = gpu
+        .target("test depth", size, wgpu::TextureFormat::Depth32Float, usage)
+        .create_view(&Default::default());
+    let depths: Vec<f32> = frame.depth_mm.iter().map(|d| (1000.0 * f64::from(NEAR) / d) as f32).collect();
+    let group = gpu.bind_layout(
+        "test depth",
+        &pipeline.get_bind_group_layout(0),
+        &[
+            gpu.storage("depths", &depths).as_entire_binding(),
+            gpu.storage("width", &[size[0]]).as_entire_binding(),
+        ],
+    );
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    {
+        let attachment = wgpu::RenderPassDepthStencilAttachment {
+            view: &view,
+            depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+            stencil_ops: None,
+        };
+        let mut timer = PassTimer::new(gpu);
+        let mut pass = timer.render(&mut encoder, "test depth", &[], Some(attachment));
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..3, 0..1);
+    }
+    gpu.queue.submit([encoder.finish()]);
+    view
+}
+
+fn upload(gpu: &Gpu, frame: &Frame) -> wgpu::TextureView {
+    let texels = frame.color.iter().zip(&frame.strength);
+    let texels = texels.map(|(c, a)| [c[0] as f32, c[1] as f32, c[2] as f32, *a as f32]).collect();
+    let size = [frame.width as u32, frame.height as u32];
+    crate::texture::upload_half(gpu, "test irradiance", size, &[vec![texels]])
+}
+
+/// RGBA of each pixel.
+fn read(gpu: &Gpu, image: &wgpu::TextureView) -> Vec<[f64; 4]> {
+    let bytes = gpu.read_texture(image.texture()).unwrap();
+    let halves: Vec<[f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+    halves.into_iter().map(|t| t.map(f16::to_f64)).collect()
+}
+
+fn run_with(gpu: &Gpu, frame: &Frame, mut work: impl FnMut(Recorder<'_>, &Images<'_>)) -> Vec<[f64; 4]> {
+    let size = [frame.width as u32, frame.height as u32];
+    let irradiance = upload(gpu, frame);
+    let depth = draw_depth(gpu, frame);
+    let (scratch, scattered) = (half_image(gpu, "scratch", size), half_image(gpu, "scattered", size));
+    let images = Images { irradiance: &irradiance, depth: &depth, scratch: &scratch, scattered: &scattered };
+    let view = gpu.uniform("view", &frame.view());
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let mut timer = PassTimer::new(gpu);
+    work(Recorder { gpu, encoder: &mut encoder, timer: &mut timer, view: &view }, &images);
+    gpu.queue.submit([encoder.finish()]);
+    gpu.check().unwrap();
+    read(gpu, &scattered)
+}
+
+fn run(gpu: &Gpu, method: ScatterMethod, profile: &Arc<Profile>, frame: &Frame) -> Vec<[f64; 4]> {
+    let mut scatter = Scatter::default();
+    scatter.prepare(gpu, method, profile).unwrap();
+    run_with(gpu, frame, |r, images| {
+        scatter.record(r, images);
+    })
+}
+
+fn skin() -> Arc<Profile> {
+    Arc::new(Profile::deon_six())
+}
+
+/// Two tilted surfaces, holes, noise and very bright pixels at an odd size; 2.2 pixels a millimetre.
+fn hostile(seed: u64) -> Frame {
+    let mut random = Random(seed);
+    let mut noise: Vec<f64> = (0..27 * 51 * 8).map(|_| random.next()).collect();
+    let mut next = || noise.pop().unwrap();
+    let cells: Vec<_> = (0..27 * 51)
+        .map(|i| {
+            let (x, y) = ((i % 27) as f64, (i / 27) as f64);
+            let bright = if next() > 0.99 { 30.0 } else { 1.0 };
+            let color = [next() * bright, next() * bright, next()];
+            let strength = if next() > 0.9 { 0.0 } else { 0.2 + 0.8 * next() };
+            let depth = if x + 0.4 * y > 25.0 { 420.0 + 0.4 * x } else { 400.0 + 0.1 * x - 0.3 * y };
+            (color, strength, depth + 0.2 * next())
+        })
+        .collect();
+    Frame::new([27, 51], 900.0, |x, y| cells[y * 27 + x])
+}
+
+/// Pixels agree within a relative bound for halves, which keep 11 bits, and one for depths: f32 knows 400 mm to 3e-5 mm,
+/// and a tangent plane ten pixels away multiplies that.
+fn assert_close(name: &str, found: &[[f64; 4]], expected: &Frame, relative: f64) {
+    let largest = expected.color.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
+    for (i, (f, e)) in found.iter().zip(&expected.color).enumerate() {
+        for c in 0..3 {
+            let bound = relative * e[c].abs() + 2e-5 * largest;
+            let at = (i % expected.width, i / expected.width);
+            assert!((f[c] - e[c]).abs() <= bound, "{name} at {at:?} channel {c}: {} and not {}", f[c], e[c]);
+        }
+    }
+}
+
+#[test]
+fn separable_agrees_with_its_equations() {
+    let Some(gpu) = gpu() else { return };
+    for (samples, seed) in [(5, 1), (17, 2), (65, 3)] {
+        let frame = hostile(seed);
+        let kernel = SeparableKernel::of(&skin(), samples).unwrap();
+        let side = separable::side(&kernel);
+        let width = kernel.half_width_mm();
+        let expected = frame.line(&side, width, 0).line(&side, width, 1);
+        let found = run(&gpu, ScatterMethod::Separable(samples as u32), &skin(), &frame);
+        // Two roundings to half: one between the passes.
+        assert_close("separable", &found, &expected, 3e-3);
+    }
+}
+
+#[test]
+fn tiles_give_what_the_images_give() {
+    let Some(gpu) = gpu() else { return };
+    let kernel = SeparableKernel::of(&skin(), 17).unwrap();
+    let params =
+        gpu.uniform("test", &line::Params::new(&separable::side(&kernel), kernel.half_width_mm(), [0.0; 3]));
+    // The kernel fits into the tile at the first focal length and not at the second.
+    for focal in [900.0, 9000.0] {
+        let frame = Frame { focal_px: focal, ..hostile(4) };
+        for vertical in [false, true] {
+            let [tiled, untiled] = [true, false].map(|tiled| {
+                let line = line::Line::with_tiles(&gpu, vertical, false, tiled);
+                run_with(&gpu, &frame, |r, i| {
+                    let step = [i.irradiance, i.scattered];
+                    line.record(r.gpu, r.encoder, r.timer, r.view, &params, i.depth, step, None);
+                })
+            });
+            for (a, b) in tiled.iter().zip(&untiled) {
+                for c in 0..4 {
+                    // The order of operations may differ by the compiler's choice: a step of half.
+                    assert!((a[c] - b[c]).abs() <= 1e-3 * a[c].abs(), "{focal} {vertical}: {a:?} {b:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn gaussians_agree_with_their_equations() {
+    let Some(gpu) = gpu() else { return };
+    for terms in [4, 6] {
+        let profile = if terms == 4 { Arc::new(Profile::jimenez_four()) } else { skin() };
+        let frame = hostile(5);
+        let (mut blurred, mut sum) = (frame.clone(), frame.clone());
+        for step in gauss::steps(&gauss::gaussians(&profile, terms).unwrap()) {
+            let taps = gauss::taps(step.deviation_mm);
+            blurred = blurred.line(&taps, step.deviation_mm, 0).line(&taps, step.deviation_mm, 1);
+            sum = sum.mix(&blurred, step.share);
+        }
+        let found = run(&gpu, ScatterMethod::ScreenGauss(terms as u32), &profile, &frame);
+        assert_close("screen-gauss", &found, &sum, 6e-3);
+    }
+}
+
+#[test]
+fn accumulated_weights_are_those_of_table_4_2() {
+    let steps = gauss::steps(&gauss::gaussians(&skin(), 6).unwrap());
+    let printed =
+        [[0.3, 0.424, 0.346], [0.261, 0.2, 0.0], [0.2, 0.007, 0.007], [0.388, 0.004, 0.0], [0.078, 0.0, 0.0]];
+    for (step, printed) in steps.iter().zip(printed) {
+        for c in 0..3 {
+            assert!((step.share[c] - printed[c]).abs() < 2e-3, "{:?} {printed:?}", step.share);
+        }
+    }
+}
+
+#[test]
+fn jitter_agrees_with_its_equations() {
+    let Some(gpu) = gpu() else { return };
+    let frame = hostile(6);
+    let taps = jitter::taps(&skin());
+    let width = taps.iter().map(|t| f64::from(t.place[0].hypot(t.place[1]))).fold(0.0, f64::max);
+    let found = run(&gpu, ScatterMethod::ScreenJitter, &skin(), &frame);
+    assert_close("screen-jitter", &found, &frame.jitter(&taps, width), 2e-3);
+}
+
+#[test]
+fn the_exact_kernel_agrees_with_integrals_over_pixels() {
+    let Some(gpu) = gpu() else { return };
+    let frame = hostile(7);
+    let profile = skin();
+    let light = |x0: f64, y0: f64, x1: f64, y1: f64| {
+        std::array::from_fn(|c| {
+            // Signed quadrants: the light of a rectangle anywhere.
+            let q =
+                |x: f64, y: f64| x.signum() * y.signum() * profile.channels[c].quadrant_cdf(x.abs(), y.abs());
+            q(x1, y1) - q(x0, y1) - q(x1, y0) + q(x0, y0)
+        })
+    };
+    // Only a corner: the truth is slow.
+    let corner = Frame {
+        width: 9,
+        height: 11,
+        color: (0..99).map(|i| frame.color[(i / 9) * 27 + i % 9]).collect(),
+        strength: (0..99).map(|i| frame.strength[(i / 9) * 27 + i % 9]).collect(),
+        depth_mm: (0..99).map(|i| frame.depth_mm[(i / 9) * 27 + i % 9]).collect(),
+        ..frame
+    };
+    let found = run(&gpu, ScatterMethod::ReferenceScreen, &profile, &corner);
+    // Linear interpolation in the table, 0.006 mm between entries where a Gaussian has 0.08 mm.
+    assert_close("reference-screen", &found, &corner.exact(exact::half_width_mm(&profile), &light), 1e-2);
+}
+
+#[test]
+fn even_light_on_a_plane_stays_even() {
+    let Some(gpu) = gpu() else { return };
+    for method in METHODS {
+        for tilt in [0.0, 0.3, -1.5] {
+            let frame = Frame::new([51, 27], 800.0, |x, _| ([0.7, 1.5, 0.1], 1.0, 400.0 + tilt * x as f64));
+            for pixel in run(&gpu, method, &skin(), &frame) {
+                for (found, expected) in pixel.iter().zip([0.7, 1.5, 0.1]) {
+                    assert_eq!(*found, half(expected), "{method} {tilt}: {pixel:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn energy_on_a_plane_is_kept() {
+    let Some(gpu) = gpu() else { return };
+    for method in METHODS {
+        let frame = Frame::new([96, 96], 800.0, |x, y| {
+            let lit = (x as f64 - 47.5).hypot(y as f64 - 47.5) < 12.0;
+            ([f64::from(u8::from(lit)); 3], 1.0, 400.0)
+        });
+        let found = run(&gpu, method, &skin(), &frame);
+        for c in 0..3 {
+            let before: f64 = frame.color.iter().map(|p| p[c]).sum();
+            let after: f64 = found.iter().map(|p| p[c]).sum();
+            assert!((after / before - 1.0).abs() < 0.01, "{method} channel {c}: {before} to {after}");
+        }
+        // And it did spread: from the edge of the spot of 6 mm radius, a tenth of its red goes farther than a pixel.
+        let outside: f64 =
+            found.iter().zip(&frame.color).filter(|(_, e)| e[0] == 0.0).map(|(f, _)| f[0]).sum();
+        let total: f64 = frame.color.iter().map(|p| p[0]).sum();
+        assert!(outside > 0.1 * total && outside < 0.3 * total, "{method}: {} outside", outside / total);
+    }
+}
+
+#[test]
+fn mirrored_light_scatters_mirrored() {
+    let Some(gpu) = gpu() else { return };
+    let frame = |flip: bool| {
+        Frame::new([51, 27], 800.0, |x, y| {
+            let x = if flip { 50 - x } else { x };
+            ([if x < 20 { 1.0 } else { 0.0 }, (y % 5) as f64, 0.3], 1.0, 400.0)
+        })
+    };
+    // Jittered and turned taps are not symmetric.
+    for method in
+        [ScatterMethod::Separable(17), ScatterMethod::ScreenGauss(6), ScatterMethod::ReferenceScreen]
+    {
+        let [a, b] = [false, true].map(|flip| run(&gpu, method, &skin(), &frame(flip)));
+        for y in 0..27 {
+            for x in 0..51 {
+                let (p, q) = (a[y * 51 + x], b[y * 51 + 50 - x]);
+                assert!(
+                    (0..3).all(|c| (p[c] - q[c]).abs() <= 2e-3 * p[c].abs() + 1e-6),
+                    "{method} {p:?} {q:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn no_strength_changes_nothing() {
+    let Some(gpu) = gpu() else { return };
+    for method in METHODS {
+        let frame = Frame { strength: vec![0.0; 27 * 51], ..hostile(8) };
+        let found = run(&gpu, method, &skin(), &frame);
+        for (f, e) in found.iter().zip(&frame.color) {
+            assert_eq!([f[0], f[1], f[2], f[3]], [e[0], e[1], e[2], 0.0], "{method}");
+        }
+    }
+}
+
+#[test]
+fn kernels_under_half_a_pixel_change_nothing() {
+    let Some(gpu) = gpu() else { return };
+    for method in METHODS {
+        // A head 60 m away.
+        let mut frame = hostile(9);
+        frame.depth_mm.iter_mut().for_each(|d| *d = if d.is_finite() { 60_000.0 } else { *d });
+        let found = run(&gpu, method, &skin(), &frame);
+        for (f, e) in found.iter().zip(&frame.color) {
+            assert_eq!([f[0], f[1], f[2]], *e, "{method}");
+        }
+    }
+}
+
+#[test]
+fn no_light_crosses_a_gap() {
+    let Some(gpu) = gpu() else { return };
+    for method in METHODS {
+        // A lit finger, 8 mm before a dark cheek; also one that is a single pixel wide.
+        let frame = Frame::new([61, 27], 900.0, |x, _| {
+            let finger = (10..30).contains(&x) || x == 45;
+            let color = if finger { [4.0; 3] } else { [0.0; 3] };
+            (color, 1.0, if finger { 392.0 } else { 400.0 })
+        });
+        for (i, p) in run(&gpu, method, &skin(), &frame).iter().enumerate() {
+            let expected = frame.color[i][0];
+            assert!((0..3).all(|c| (p[c] - expected).abs() < 1e-6), "{method} at {}: {p:?}", i % 61);
+        }
+    }
+}
+
+#[test]
+fn what_is_not_skin_takes_and_gives_nothing() {
+    let Some(gpu) = gpu() else { return };
+    for method in METHODS {
+        let frame = Frame::new([51, 27], 900.0, |x, _| {
+            if x < 25 { ([0.25; 3], 1.0, 400.0) } else { ([9.0; 3], 0.0, 400.0) }
+        });
+        for (i, p) in run(&gpu, method, &skin(), &frame).iter().enumerate() {
+            let expected = if i % 51 < 25 { 0.25 } else { 9.0 };
+            assert!((0..3).all(|c| (p[c] - expected).abs() < 3e-4), "{method} at {}: {p:?}", i % 51);
+        }
+    }
+}
+
+#[test]
+fn any_zoom_gives_numbers() {
+    let Some(gpu) = gpu() else { return };
+    let exponentials = |d: f64| {
+        let channel = rubor_rig::skin::diffusion::NormalizedDiffusion::published(0.5, d).unwrap();
+        Arc::new(Profile {
+            name: "test".into(),
+            channels: [0; 3].map(|_| RadialProfile::NormalizedDiffusion(channel)),
+        })
+    };
+    for method in METHODS {
+        for profile in [skin(), exponentials(1e-3), exponentials(100.0)] {
+            let mut scatter = Scatter::default();
+            scatter.prepare(&gpu, method, &profile).unwrap();
+            for (focal, depth) in [(1e-3, 1e6), (30.0, 2e4), (5e5, 11.0), (1e9, 10.5)] {
+                // The exact kernel is slow where it fills the picture; its window is bounded all the same.
+                if method == ScatterMethod::ReferenceScreen && focal > 1e3 {
+                    continue;
+                }
+                let mut frame = hostile(10);
+                frame.focal_px = f64::from(focal as f32);
+                frame.depth_mm.iter_mut().for_each(|d| *d *= depth / 400.0);
+                let found = run_with(&gpu, &frame, |r, images| {
+                    scatter.record(r, images);
+                });
+                for p in found {
+                    assert!(p.iter().all(|v| v.is_finite() && *v >= 0.0), "{method} {focal}: {p:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn wrong_numbers_and_profiles_are_errors() {
+    let Some(gpu) = gpu() else { return };
+    let mut scatter = Scatter::default();
+    for method in [ScatterMethod::Separable(16), ScatterMethod::ScreenGauss(5), ScatterMethod::BurleyDisk(1)]
+    {
+        assert!(matches!(scatter.prepare(&gpu, method, &skin()), Err(RenderError::Limit { .. })), "{method}");
+    }
+}
