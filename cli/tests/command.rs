@@ -1,0 +1,219 @@
+//! The command as a person uses it: what it makes, and what it says to wrong input.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn rubor(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_rubor")).args(arguments).output().expect("the command starts")
+}
+
+/// A fresh folder that is removed when the test ends.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("rubor-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).expect("a temporary folder");
+        Self(path)
+    }
+
+    fn file(&self, name: &str, content: &[u8]) -> String {
+        let path = self.0.join(name);
+        std::fs::write(&path, content).expect("a temporary file");
+        text(&path)
+    }
+
+    fn path(&self, name: &str) -> String {
+        text(&self.0.join(name))
+    }
+
+    fn names(&self, folder: &str) -> Vec<String> {
+        let entries = std::fs::read_dir(self.0.join(folder)).into_iter().flatten().flatten();
+        let mut names: Vec<_> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn text(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
+/// False, loudly, where nothing can draw.
+fn can_draw() -> bool {
+    let found = rubor(&["adapters"]).status.success();
+    assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
+    if !found {
+        eprintln!("SKIPPED: no graphics adapter");
+    }
+    found
+}
+
+/// The command must refuse: exit code 2, every phrase in one message, and nothing in the output folder.
+fn refused(folder: &Folder, arguments: &[&str], phrases: &[&str]) {
+    let out = folder.path("out");
+    let mut all = arguments.to_vec();
+    if arguments.first() == Some(&"render") {
+        all.extend(["-o", &out]);
+    }
+    let output = rubor(&all);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?} said {said}");
+    for phrase in phrases {
+        assert!(said.contains(phrase), "{arguments:?} said {said:?}, expected {phrase:?}");
+    }
+    let left: Vec<_> = folder.names("out").into_iter().filter(|n| n != "job.json").collect();
+    assert!(left.is_empty(), "{arguments:?} left {left:?}");
+}
+
+const STILL: &str =
+    r#"{ "fps": 2, "duration": 1, "expressions": { "joy": 1 }, "environment": { "name": "studio" } }"#;
+
+#[test]
+fn a_small_job_makes_everything_and_resumes() {
+    if !can_draw() {
+        return;
+    }
+    let folder = Folder::new("job");
+    let sequence = folder.file("s.json", STILL.as_bytes());
+    let out = folder.path("out");
+    let job = [
+        "render",
+        "--sequence",
+        &sequence,
+        "-o",
+        &out,
+        "--size",
+        "64x48",
+        "--antialias",
+        "smaa-1x",
+        "--json",
+    ];
+    let first = rubor(&job);
+    assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
+    let stats: serde_json::Value = serde_json::from_slice(&first.stdout).expect("statistics are JSON");
+    assert_eq!(stats["framesDrawn"], 2);
+    assert!(stats["triangles"].as_u64().is_some_and(|n| n > 10_000));
+    let names = folder.names("out");
+    for expected in [
+        "animated_head.glb",
+        "contact_sheet.png",
+        "frame.0001.png",
+        "frame.0002.png",
+        "job.json",
+        "stats.json",
+    ] {
+        assert!(names.iter().any(|n| n == expected), "{names:?} lacks {expected}");
+    }
+    assert!(!names.iter().any(|n| n.contains("partial")), "{names:?}");
+
+    // One frame is lost, the other half written by a killed run: both are drawn again, with the same bytes.
+    let frame = |n: u32| folder.0.join(format!("out/frame.{n:04}.png"));
+    let whole = std::fs::read(frame(1)).expect("frame 1");
+    std::fs::write(frame(1), &whole[..whole.len() / 2]).expect("cut");
+    let again = rubor(&[&job[..], &["--resume"]].concat());
+    assert!(again.status.success(), "{}", String::from_utf8_lossy(&again.stderr));
+    let stats: serde_json::Value = serde_json::from_slice(&again.stdout).expect("statistics are JSON");
+    assert_eq!(stats["framesDrawn"], 1);
+    assert_eq!(std::fs::read(frame(1)).expect("frame 1"), whole);
+
+    // Another job does not resume into these frames.
+    let other = rubor(&[&job[..], &["--resume", "--exposure", "3"]].concat());
+    assert_eq!(other.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&other.stderr).contains("another job"));
+
+    // The animated head is a head again.
+    let reread = rubor(&["import", &folder.path("out/animated_head.glb"), "-o", &folder.path("again.glb")]);
+    assert!(reread.status.success(), "{}", String::from_utf8_lossy(&reread.stderr));
+    assert!(String::from_utf8_lossy(&reread.stdout).contains("52 shapes"));
+}
+
+#[test]
+fn wrong_files_get_one_clear_message() {
+    let folder = Folder::new("wrong");
+    let missing = folder.path("nothing.glb");
+    refused(&folder, &["render", "--head", &missing], &["nothing.glb", "no such file"]);
+    let is_folder = text(&folder.0);
+    refused(&folder, &["render", "--head", &is_folder], &["a folder", "expected a head"]);
+    let head = include_bytes!("../../assets/head.glb");
+    let cut = folder.file("cut.glb", &head[..100_000]);
+    refused(&folder, &["render", "--head", &cut], &["cut.glb"]);
+    let empty = folder.file("empty.glb", b"");
+    refused(&folder, &["render", "--head", &empty], &["empty.glb"]);
+
+    let typo = folder.file("typo.json", STILL.replace("joy", "jjoy").as_bytes());
+    refused(&folder, &["render", "--sequence", &typo], &["typo.json:1:", "jjoy", "did you mean \"joy\""]);
+    let field = folder.file("field.json", STILL.replace("\"fps\"", "\"fpss\"").as_bytes());
+    refused(&folder, &["render", "--sequence", &field], &["field.json:1:3", "fpss", "fps"]);
+    let zero = folder.file("zero.json", STILL.replace("\"duration\": 1", "\"duration\": 0").as_bytes());
+    refused(&folder, &["render", "--sequence", &zero], &["zero.json:1:25", "found 0", "a length in seconds"]);
+    let shape = r#"{ "expressions": { "joy": { "shapes": { "mouthSmileLef": 1 } } } }"#;
+    let shape = folder.file("rig.json", shape.as_bytes());
+    refused(&folder, &["render", "--rig", &shape], &["rig.json:1:", "mouthSmileLef", "mouthSmileLeft"]);
+    let sum = r#"{ "expressions": { "joy": { "hemoglobin": { "joy": 0.8, "anger": 0.7 } } } }"#;
+    let sum = folder.file("sum.json", sum.as_bytes());
+    refused(&folder, &["render", "--rig", &sum], &["sum.json:1:", "1.5"]);
+    let nowhere = folder.file("nowhere.json", STILL.replace("studio", "stdio").as_bytes());
+    if can_draw() {
+        refused(&folder, &["render", "--sequence", &nowhere], &["stdio", "studio"]);
+    }
+}
+
+#[test]
+fn wrong_arguments_get_one_clear_message() {
+    let folder = Folder::new("arguments");
+    refused(&folder, &["render", "--size", "0x64"], &["0x64"]);
+    refused(&folder, &["render", "--size", "wide"], &["WIDTHxHEIGHT"]);
+    refused(&folder, &["render", "--scatter", "separable:16"], &["separable:16"]);
+    refused(&folder, &["render", "--antialias", "smaa"], &["smaa-1x"]);
+    refused(&folder, &["render", "--frames", "9999"], &["9999", "at most"]);
+    refused(&folder, &["import", "no/such/folder", "-o", "x.glb"], &["no/such/folder"]);
+    if can_draw() {
+        refused(&folder, &["render", "--size", "100000x100000"], &["100000x100000"]);
+        refused(&folder, &["render", "--adapter", "abacus"], &["abacus", "there are"]);
+    }
+    let file = folder.file("file", b"");
+    let inside = format!("{file}/frames");
+    let output = rubor(&["render", "-o", &inside]);
+    if can_draw() {
+        assert_eq!(output.status.code(), Some(2), "a folder inside a file cannot be made");
+    }
+}
+
+#[test]
+fn obj_sets_of_unequal_size_and_broken_numbers_are_refused() {
+    let folder = Folder::new("obj");
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let import = |folder: &Folder, phrases: &[&str]| {
+        let (set, out) = (folder.path("set"), folder.path("head.glb"));
+        refused(folder, &["import", &set, "-o", &out], phrases);
+        assert!(!Path::new(&out).exists());
+    };
+    std::fs::create_dir(folder.0.join("set")).expect("a folder");
+    folder.file("set/neutral.obj", triangle.as_bytes());
+    folder.file("set/smile.obj", format!("v 2 2 2\n{triangle}").as_bytes());
+    import(&folder, &["smile.obj", "4", "3"]);
+    folder.file("set/smile.obj", triangle.replace("v 1 0 0", "v NaN 0 0").as_bytes());
+    import(&folder, &["smile.obj", "line 2", "NaN"]);
+    folder.file("set/smile.obj", b"");
+    import(&folder, &["smile.obj"]);
+}
+
+#[test]
+fn schemas_and_adapters_are_json() {
+    for of in ["rig", "sequence"] {
+        let output = rubor(&["schema", of]);
+        let schema: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a schema is JSON");
+        assert!(schema["properties"].is_object());
+    }
+    let output = rubor(&["adapters", "--json"]);
+    let list: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a list is JSON");
+    assert!(list.is_array());
+}
