@@ -31,7 +31,10 @@ pub(crate) const SHADER: &str = concat!(
     include_str!("../../shared/view.wgsl"),
     include_str!("../../shared/math.wgsl"),
     include_str!("../../shared/surface.wgsl"),
-    include_str!("shade.wgsl")
+    include_str!("shade.wgsl"),
+    include_str!("eye.wgsl"),
+    include_str!("mouth.wgsl"),
+    include_str!("micro.wgsl")
 );
 
 /// A light as the shader reads it; the fields are described there.
