@@ -11,14 +11,14 @@ use super::regions::{Regions, above_hairline, through};
 /// Upper and lower border of the brow on the plan: (s, low, high), mm. The head of the brow is upright and soft, the
 /// arch is highest at two thirds, the tail is thin.
 const BROW: [[f32; 3]; 8] = [
-    [9.5, 17.6, 23.2],
-    [13.0, 18.2, 25.6],
-    [20.0, 20.0, 27.6],
-    [30.0, 22.0, 28.8],
-    [40.0, 23.0, 28.6],
-    [48.0, 22.0, 26.6],
-    [56.0, 18.8, 22.2],
-    [63.0, 15.0, 16.8],
+    [9.5, 15.6, 24.2],
+    [13.0, 16.4, 26.0],
+    [20.0, 18.2, 27.4],
+    [30.0, 20.2, 28.8],
+    [40.0, 21.2, 28.6],
+    [48.0, 20.2, 26.6],
+    [56.0, 17.0, 21.8],
+    [63.0, 13.4, 16.0],
 ];
 
 /// One hair's look.
@@ -76,9 +76,9 @@ impl Hairs {
         }
         // The edge is ragged at the scale of tufts and thin over a centimetre.
         let height = above_hairline(plan(place))
-            + 2.6 * noise(place, 15.0, self.seed ^ 9)
-            + 1.6 * noise(place, 4.0, self.seed ^ 10);
-        let scalp = self.scalp * smoothstep(-3.5, 9.0, height) * (1.0 - r.ear);
+            + 1.5 * noise(place, 15.0, self.seed ^ 9)
+            + 1.2 * noise(place, 2.2, self.seed ^ 10);
+        let scalp = self.scalp * smoothstep(-4.0, 10.0, height) * (1.0 - r.ear);
         if scalp > 0.01 {
             clear *= 1.0 - self.cropped_strokes(place, scalp);
         }
@@ -95,10 +95,10 @@ impl Hairs {
         let squeezed = |stretch: f32| place - along * along.dot(place) * (1.0 - 1.0 / stretch);
         let width_mm = 0.34f32.max(1.5 * self.finest_mm);
         let fine = noise(squeezed(7.0), width_mm, self.seed ^ 13);
-        let coarse = noise(squeezed(4.0), 1.3, self.seed ^ 14);
+        let coarse = noise(squeezed(5.0), 0.9, self.seed ^ 14);
         let tufts = noise(place, 6.0, self.seed ^ 15);
-        let strokes = smoothstep(-1.3, 1.0, fine + 0.55 * coarse + 0.3 * tufts + 2.6 * (density - 0.62));
-        (0.30 * density + 0.66 * strokes * smoothstep(0.0, 0.35, density)).min(0.97)
+        let strokes = smoothstep(-1.0, 0.9, fine + 0.5 * coarse + 0.2 * tufts + 3.4 * (density - 0.55));
+        (0.45 * density * density + 0.52 * strokes * smoothstep(0.0, 0.4, density)).min(0.97)
     }
 
     /// Cut hairs as dots over a tint.

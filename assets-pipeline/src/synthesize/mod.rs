@@ -86,8 +86,8 @@ impl Default for Options {
         Self {
             seed: 1,
             resolution: 2048,
-            melanin: 0.03,
-            hemoglobin: 0.014,
+            melanin: 0.026,
+            hemoglobin: 0.017,
             age_years: 32.0,
             freckles: 0.3,
             moles: 7,

@@ -21,7 +21,7 @@ use super::noise::Stream;
 
 /// Width of a ribbon at its root, mm. Terminal hair is 0.06 to 0.1 mm thick; brows and lashes look fuller than single
 /// hairs, and these are fewer.
-const WIDTH_MM: f32 = 0.11;
+const WIDTH_MM: f32 = 0.13;
 /// Name of the part that holds the brows.
 const BROWS: &str = "brows";
 /// Strands of an upper and of a lower lash card.
@@ -85,13 +85,13 @@ pub(super) fn grow_brows(head: &mut Head, options: &Options) {
         }
     }
     let mut stream = Stream::new(options.seed_bits() ^ 0xb203);
-    let strands = brow_strokes(options, 330.0)
+    let strands = brow_strokes(options, 400.0)
         .into_iter()
         .filter_map(|knots| {
             let lift = stream.range(0.25, 1.0) / MM_PER_METRE;
             let anchored = knots.iter().enumerate().map(|(i, k)| {
                 let t = i as f32 / (knots.len() - 1) as f32;
-                Some((chart.at(*k)?, 0.00006 + lift * (1.6 * t - 0.9 * t * t)))
+                Some((chart.at(*k)?, 0.00006 + lift * (1.4 * t - 0.6 * t * t)))
             });
             Some(Strand { knots: anchored.collect::<Option<_>>()? })
         })
@@ -132,7 +132,7 @@ fn lash_strands(chart: &Chart, count: usize, upper: bool) -> Vec<Strand> {
         let lean = 0.55 * (tuft - u) + 0.012 * stream.normal();
         // Shorter towards the inner corner, whichever end that is, and none at the very ends.
         let ends = (4.0 * u * (1.0 - u)).powf(0.35);
-        let knots = [0.0f32, 0.34, 0.68, 1.0].map(|t| {
+        let knots = [0.0f32, 0.4, 1.0].map(|t| {
             let at = Vec2::new((u + lean * t * t).clamp(0.002, 0.998), (length * ends * t).clamp(0.002, 0.998));
             chart.at(at).map(|a| (a, 0.0))
         });

@@ -157,6 +157,7 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     let keep: Vec<f32> = mesh.points.iter().map(|p| bust.keep(*p)).collect();
     (mesh, shapes) = mesh.clip(&keep, &shapes);
     layout::pack_skin(&mut mesh);
+    eyes::clear_skin(&mesh, &mut shapes, &eyes);
     eyes::add(&mut mesh, &mut shapes, &eyes);
 
     let (mut head, _) = build_head(&mesh, &shapes, &PARTS[..13], OFFSET_THRESHOLD);

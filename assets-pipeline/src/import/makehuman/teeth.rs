@@ -14,14 +14,22 @@ use crate::poly::PolyMesh;
 /// Texture units in a metre.
 const SCALE: f32 = 10.0;
 /// Biting edge of the upper incisors below the line where the lips meet, metres: at rest the lip shows a little of
-/// them (2 mm in young adults).
-const SHOWN: f32 = 0.0022;
+/// them (2 mm in young adults), and the landmark lies on the lower lip's rim, 4 mm above.
+const SHOWN: f32 = 0.006;
+/// How the tongue is moved, metres.
+const TONGUE: Vec3 = Vec3::new(0.0, -0.007, -0.006);
 /// The lower incisors reach behind the upper ones by this, metres.
-const OVERBITE: f32 = 0.0016;
+const OVERBITE: f32 = 0.002;
 
 /// Moves the rows in behind closed lips (those of the base mesh show at the corners) and to the height of the lips.
 pub(super) fn fit(mesh: &mut PolyMesh) {
     let Some(lips) = landmarks::middle("stomion").map(|p| mesh.points[p as usize].y) else { return };
+    // The tongue of the base mesh fills the mouth to the palate.
+    if let Some(tongue) = mesh.groups.iter().position(|g| g == "helper-tongue") {
+        let faces = (0..mesh.face_count()).filter(|f| mesh.face_groups[*f] == tongue as u32);
+        let points: BTreeSet<u32> = faces.flat_map(|f| mesh.face(f)).map(|c| c.point).collect();
+        points.iter().for_each(|p| mesh.points[*p as usize] += TONGUE);
+    }
     for (group, upper) in [("helper-upper-teeth", true), ("helper-lower-teeth", false)] {
         let Some(index) = mesh.groups.iter().position(|g| g == group) else { continue };
         let faces: Vec<usize> =

@@ -166,8 +166,9 @@ impl Shade {
     ) {
         let maps = shaded.head.maps.as_ref();
         let params = Params {
-            slope_scale: 1.0,
-            wrinkle_strength: 1.0,
+            // Maps hold true depths; interreflection between pores, which is not drawn, would deepen them to the eye.
+            slope_scale: 1.35,
+            wrinkle_strength: 1.25,
             hemoglobin_scale: shaded.hemoglobin_scale,
             head: shaded.index,
             environment_intensity: lighting.environment_intensity,
