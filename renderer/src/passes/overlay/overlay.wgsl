@@ -9,6 +9,8 @@ struct Params {
     padding_0: u32,
     padding_1: u32,
     padding_2: u32,
+    // rgb = albedo of hair.
+    hair: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -28,17 +30,42 @@ struct Corner {
     @location(1) position: vec3f,
     @location(2) normal: vec3f,
     @location(3) @interpolate(flat, either) material: u32,
+    // Share of the drawn width that the hair fills, and where across it, -1 to 1.
+    @location(4) opacity: f32,
+    @location(5) across: f32,
 }
+
+// Width of a hair that is geometry, at its root, metres (u >= 2: rubor-assets' strands).
+const STRAND_WIDTH = 0.00013;
 
 @vertex
 fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
     let triangle = triangles[params.first + corner / 3u];
     let index = triangle[corner % 3u];
     let vertex = vertices[index];
-    let position = positions[vertex.point].xyz;
+    var position = positions[vertex.point].xyz;
+    let frame = frames[index];
+    var opacity = 1.0;
+    var across = 0.0;
     var clip = view.clip_from_world * vec4f(position, 1.0);
+    if (triangle.w == LASH || triangle.w == HAIR) && vertex.u >= 2.0 {
+        // A hair faces the viewer and is drawn no thinner than a pixel; it fades instead.
+        let side = vertex.u - 2.0 * floor(0.5 * vertex.u) - 0.5;
+        let width = STRAND_WIDTH * (1.0 - vertex.v * vertex.v);
+        let center = position - side * width * frame.tangent;
+        let along = cross(frame.normal, frame.tangent);
+        clip = view.clip_from_world * vec4f(center, 1.0);
+        let ahead = view.clip_from_world * vec4f(center + 1e-4 * along, 1.0);
+        let step = (ahead.xy / ahead.w - clip.xy / clip.w) * vec2f(view.size);
+        let normal = select(vec2f(1.0, 0.0), normalize(vec2f(-step.y, step.x)), dot(step, step) > 1e-12);
+        let true_pixels = width * view.origin.w / clip.w;
+        let drawn = max(true_pixels, 1.15);
+        opacity = true_pixels / drawn;
+        across = 2.0 * side;
+        clip += vec4f(normal * side * drawn * 2.0 / vec2f(view.size) * clip.w, 0.0, 0.0);
+    }
     clip += vec4f(vec2f(2.0, -2.0) * view.jitter / vec2f(view.size) * clip.w, 0.0, 0.0);
-    return Corner(clip, vec2f(vertex.u, vertex.v), position, frames[index].normal, triangle.w);
+    return Corner(clip, vec2f(vertex.u, vertex.v), position, frame.normal, triangle.w, opacity, across);
 }
 
 // Strands across a card of unit width.
@@ -47,6 +74,15 @@ const LASH_STRANDS = 46.0;
 // Premultiplied radiance and coverage.
 @fragment
 fn overlay_fragment(corner: Corner) -> @location(0) vec4f {
+    if (corner.material == LASH || corner.material == HAIR) && corner.uv.x >= 1.5 {
+        // Brighter along its middle, as a cylinder is; each hair a little lighter or darker than the next.
+        let id = floor(0.5 * corner.uv.x);
+        let random = fract(sin(id * 127.1) * 43758.5453);
+        let albedo = select(params.hair.rgb * mix(0.35, 0.95, random), vec3f(0.016, 0.011, 0.008), corner.material == LASH);
+        let round = 0.75 + 0.5 * sqrt(max(1.0 - corner.across * corner.across, 0.0));
+        let alpha = clamp(0.96 * corner.opacity, 0.0, 1.0);
+        return vec4f(albedo * params.ambient.rgb * round * alpha, alpha);
+    }
     if corner.material == LASH || corner.material == HAIR {
         // Lashes lean and cluster: each strand starts a little off and gets thinner towards its tip.
         let strand = corner.uv.x * LASH_STRANDS;

@@ -31,7 +31,10 @@ pub(crate) const SHADER: &str = concat!(
     include_str!("../../shared/view.wgsl"),
     include_str!("../../shared/math.wgsl"),
     include_str!("../../shared/surface.wgsl"),
-    include_str!("shade.wgsl")
+    include_str!("shade.wgsl"),
+    include_str!("eye.wgsl"),
+    include_str!("mouth.wgsl"),
+    include_str!("micro.wgsl")
 );
 
 /// A light as the shader reads it; the fields are described there.
@@ -168,8 +171,9 @@ impl Shade {
     ) {
         let maps = shaded.head.maps.as_ref();
         let params = Params {
-            slope_scale: 1.0,
-            wrinkle_strength: 1.0,
+            // Maps hold true depths; interreflection between pores, which is not drawn, would deepen them to the eye.
+            slope_scale: 1.35,
+            wrinkle_strength: 1.25,
             hemoglobin_scale: shaded.hemoglobin_scale,
             head: shaded.index,
             environment_intensity: lighting.environment_intensity,

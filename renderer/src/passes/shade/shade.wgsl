@@ -204,19 +204,15 @@ fn surface_at(pixel: vec2f, corners: vec4u) -> Surface {
     surface.scattering = 0.0;
     switch corners.w {
         case SKIN: { skin(&surface, uv, duv_dx, duv_dy, tangent, bitangent); }
-        case EYE: { eye(&surface, uv, duv_dx, duv_dy, tangent, bitangent, to_viewer); }
+        case EYE: { eye(&surface, pixel, uv, duv_dx, duv_dy, tangent, bitangent, to_viewer); }
         case TEETH: {
-            surface.albedo = vec3f(0.62, 0.55, 0.42);
-            surface.specular = 0.5;
-            surface.roughness = 0.25;
-            surface.f0 = 0.045;
-            surface.occlusion *= surface.occlusion;
+            teeth(&surface, uv, tangent, bitangent);
         }
         case GUMS, MUCOSA: {
-            surface.albedo = vec3f(0.36, 0.11, 0.10);
+            surface.albedo = vec3f(0.30, 0.085, 0.078);
             surface.specular = 0.5;
-            surface.roughness = 0.28;
-            surface.occlusion *= surface.occlusion;
+            surface.roughness = 0.22;
+            surface.occlusion *= surface.occlusion * surface.occlusion;
         }
         default: {
             surface.albedo = vec3f(0.2);
@@ -250,6 +246,8 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
                 * textureSampleGrad(wrinkle_maps, trilinear_repeat, uv, i, duv_dx, duv_dy).xy;
         }
     }
+    let micro = micro_relief(uv, duv_dx, duv_dy);
+    slopes += params.slope_scale * micro.xy;
     (*surface).normal =
         normalize((*surface).smooth_normal + slopes.x * tangent + slopes.y * bitangent);
 
@@ -267,69 +265,9 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
     let gloss = textureSampleGrad(gloss_map, trilinear_repeat, uv, duv_dx, duv_dy);
     (*surface).specular = gloss.r;
     // Slope variance that the mip level hides is roughness (Toksvig 2005; for Beckmann m^2 = 2 sigma^2).
-    let variance = square(params.slope_scale) * fine.z;
+    let variance = square(params.slope_scale) * (fine.z + micro.z);
     (*surface).roughness = sqrt(min(square(gloss.g) + 2.0 * variance, 0.64));
     (*surface).scattering = map.b;
-}
-
-// The azimuthal coordinates of Material::Eye. Angles in radians.
-const IRIS_ANGLE = 0.5146;
-const PUPIL_ANGLE = 0.17;
-const EYE_RADIUS_MM = 12.0;
-const IRIS_DEPTH_MM = 2.2;
-
-fn eye(
-    surface: ptr<function, Surface>,
-    uv: vec2f,
-    duv_dx: vec2f,
-    duv_dy: vec2f,
-    tangent: vec3f,
-    bitangent: vec3f,
-    to_viewer: vec3f,
-) {
-    let from_axis = uv - 0.5;
-    let theta = 2.0 * PI * length(from_axis);
-    (*surface).specular = 1.0;
-    (*surface).f0 = 0.025;
-    (*surface).roughness = mix(0.06, 0.16, smoothstep(IRIS_ANGLE, IRIS_ANGLE + 0.15, theta));
-
-    // Looking through the cornea: the refracted ray meets the iris plane off to the side.
-    let normal = (*surface).smooth_normal;
-    let refracted = refract(-to_viewer, normal, 1.0 / 1.336);
-    let sideways = vec2f(dot(refracted, tangent), -dot(refracted, bitangent)) / max(-dot(refracted, normal), 0.2);
-    let inside = smoothstep(IRIS_ANGLE + 0.04, IRIS_ANGLE - 0.1, theta);
-    let shifted = from_axis + inside * sideways * IRIS_DEPTH_MM / (2.0 * PI * EYE_RADIUS_MM);
-    let radius = 2.0 * PI * length(shifted);
-    let around = atan2(shifted.y, shifted.x);
-    // Width of a pixel in the same angle, for soft borders.
-    let pixel = clamp(2.0 * PI * max(length(duv_dx), length(duv_dy)), 0.005, 0.2);
-
-    // Iris: a collarette, radial fibres, a dark limbus.
-    let r = clamp((radius - PUPIL_ANGLE) / (IRIS_ANGLE - PUPIL_ANGLE), 0.0, 1.0);
-    let fibres = 0.5 + 0.28 * sin(around * 61.0 + 3.0 * sin(r * 7.0)) * sin(around * 23.0 + r * 5.0)
-        + 0.22 * sin(around * 113.0 + r * 9.0);
-    let fade = clamp(0.06 / pixel, 0.0, 1.0);
-    let texture = mix(0.5, fibres, fade);
-    var iris = mix(vec3f(0.17, 0.085, 0.035), vec3f(0.075, 0.10, 0.085), smoothstep(0.15, 0.75, r));
-    iris *= 0.55 + 0.9 * texture;
-    iris *= 1.0 - 0.75 * smoothstep(0.72, 1.0, r);
-    let pupil = smoothstep(PUPIL_ANGLE - pixel, PUPIL_ANGLE + pixel, radius);
-    iris *= pupil;
-
-    // Sclera: never white; veins and blood towards the corners.
-    let blush = smoothstep(0.7, 1.5, theta);
-    let sclera = mix(vec3f(0.56, 0.52, 0.48), vec3f(0.50, 0.32, 0.27), blush);
-    let limbus = smoothstep(IRIS_ANGLE - 0.05 - pixel, IRIS_ANGLE + 0.05 + pixel, radius);
-    (*surface).albedo = mix(iris, sclera, limbus);
-
-    // The iris is a shallow bowl: it is lit as if it faced the middle.
-    let outward_uv = select(vec2f(0.0), from_axis / length(from_axis), length(from_axis) > 1e-5);
-    let outward = outward_uv.x * tangent - outward_uv.y * bitangent;
-    let axis = normalize(normal * cos(theta) - outward * sin(theta));
-    let bowl = normalize(axis - 0.35 * r * outward);
-    (*surface).diffuse_normal = normalize(mix(bowl, normal, limbus));
-    // Lids shade the eye more than the rest pose says.
-    (*surface).occlusion = (*surface).occlusion * (*surface).occlusion;
 }
 
 // ---- Light ----
@@ -339,6 +277,17 @@ fn beckmann(cos_half: f32, m: f32) -> f32 {
     let c2 = max(cos_half * cos_half, 1e-4);
     let m2 = m * m;
     return exp((c2 - 1.0) / (c2 * m2)) / (PI * m2 * c2 * c2);
+}
+
+// A large source widens the highlight; a mirror shows it as a disc.
+fn highlight(cos_half: f32, roughness: f32, spread: f32) -> f32 {
+    if roughness < 0.12 {
+        // Half vectors of a disc of tangent `spread` fill a cone of half that angle, softened by the roughness.
+        let radius = max(0.5 * spread, 0.045);
+        let sine = sqrt(max(1.0 - cos_half * cos_half, 0.0));
+        return smoothstep(radius + 0.5 * roughness, radius - 0.5 * roughness, sine) / (PI * radius * radius);
+    }
+    return beckmann(cos_half, sqrt(square(roughness) + 0.25 * square(spread)));
 }
 
 fn schlick(f0: f32, cosine: f32) -> f32 { return f0 + (1.0 - f0) * pow5(1.0 - clamp(cosine, 0.0, 1.0)); }
@@ -383,9 +332,7 @@ fn add_light(
     if cos_light > 0.0 {
         let half_vector = to_light + to_viewer;
         let h = normalize(half_vector);
-        // A large source widens the highlight.
-        let m = sqrt(square(surface.roughness) + 0.25 * square(spread));
-        let brdf = beckmann(dot(surface.normal, h), m) * schlick(surface.f0, dot(h, to_viewer))
+        let brdf = highlight(dot(surface.normal, h), surface.roughness, spread) * schlick(surface.f0, dot(h, to_viewer))
             / max(dot(half_vector, half_vector), 0.05);
         *specular += irradiance * surface.specular * brdf * cos_light;
     }
