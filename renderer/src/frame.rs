@@ -15,7 +15,7 @@ use crate::passes::display::Display;
 use crate::passes::morph::Morph;
 use crate::passes::overlay::Overlay;
 use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
-use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded};
+use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded, TransmitMethod, Transmittance};
 use crate::passes::shadow::{LightView, Shadow};
 use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
 use crate::passes::visibility::Visibility;
@@ -28,7 +28,9 @@ pub struct Settings {
     pub size: [u32; 2],
     /// How light scatters in skin.
     pub scatter: ScatterMethod,
-    /// How far it does, for every method.
+    /// How light passes through thin parts.
+    pub transmit: TransmitMethod,
+    /// How far light goes in skin, for every method.
     pub profile: Arc<Profile>,
     /// Pixels of the frame on a side of a pixel of the image (1 to 8): `ssaa`.
     pub supersampling: u32,
@@ -91,6 +93,7 @@ pub struct Renderer {
     compose: Compose,
     overlay: Overlay,
     display: Display,
+    transmittance: Option<(Arc<Profile>, Transmittance)>,
     targets: Option<Targets>,
     instances: Vec<Instance>,
     timer: PassTimer,
@@ -195,6 +198,7 @@ impl Renderer {
             compose: Compose::new(&gpu),
             overlay: Overlay::new(&gpu),
             display: Display::new(&gpu),
+            transmittance: None,
             targets: None,
             instances: Vec::new(),
             timer: PassTimer::new(&gpu),
@@ -227,6 +231,12 @@ impl Renderer {
         }
         self.fit_instances(scene);
         self.scatter.prepare(&self.gpu, settings.scatter, &settings.profile)?;
+        if settings.transmit == TransmitMethod::ShadowDepth
+            && self.transmittance.as_ref().is_none_or(|(p, _)| *p != settings.profile)
+        {
+            let table = Transmittance::new(&self.gpu, &settings.profile)?;
+            self.transmittance = Some((settings.profile.clone(), table));
+        }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.record_frame(&mut encoder, scene, settings);
         self.gpu.queue.submit([encoder.finish()]);
@@ -380,6 +390,11 @@ impl Renderer {
             environment: scene.environment,
             environment_intensity: scene.environment_intensity,
             ids: &targets.ids,
+            transmittance: match (settings.transmit, settings.scatter) {
+                // The integral over the surface holds the light from behind.
+                (TransmitMethod::None, _) | (_, ScatterMethod::ReferenceSurface(_)) => None,
+                (TransmitMethod::ShadowDepth, _) => self.transmittance.as_ref().map(|(_, t)| t),
+            },
         };
         let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
         for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {

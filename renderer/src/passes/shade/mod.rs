@@ -15,11 +15,21 @@
 //! Differs from the sources: slope variance that minification hides widens the Beckmann lobe (Toksvig 2005), and so
 //! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
 //!
-//! Does not: transmit light through thin parts, reflect one part of the head in another.
+//! Transmittance (papers/004 ch. 5): light through thin parts from the depth in shadow maps and T(s), added to the
+//! diffuse light that is scattered next. Lamps without shadows transmit nothing. For the environment, which has no
+//! shadow map, the thickness is that which a lamp behind the surface sees.
+//!
+//! Does not: reflect one part of the head in another.
+
+use std::fmt;
+use std::str::FromStr;
 
 use glam::{Mat4, Vec3};
+use rubor_rig::skin::profile::Profile;
+use rubor_rig::skin::transmittance::TransmittanceTable;
 
 use crate::environment::Environment;
+use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
 use crate::head::HeadOnGpu;
 use crate::passes::appearance::Blended;
@@ -33,6 +43,45 @@ pub(crate) const SHADER: &str = concat!(
     include_str!("../../shared/surface.wgsl"),
     include_str!("shade.wgsl")
 );
+
+/// How light passes through thin parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TransmitMethod {
+    /// `none`: it does not.
+    None,
+    /// `shadow-depth`: thickness from shadow maps, light from T(s) (Jimenez et al. 2010; papers/004 ch. 5).
+    ShadowDepth,
+}
+
+impl fmt::Display for TransmitMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::ShadowDepth => "shadow-depth",
+        })
+    }
+}
+
+impl FromStr for TransmitMethod {
+    type Err = RenderError;
+
+    fn from_str(text: &str) -> Result<Self, RenderError> {
+        match text {
+            "none" => Ok(Self::None),
+            "shadow-depth" => Ok(Self::ShadowDepth),
+            _ => Err(RenderError::Limit {
+                what: "transmittance",
+                found: text.into(),
+                expected: "expected none or shadow-depth".into(),
+            }),
+        }
+    }
+}
+
+/// Entries of T(s): a step of 0.03 mm for skin.
+const TRANSMITTANCE_ENTRIES: usize = 256;
+/// Millimetres that a point is moved inwards before its depth is compared: 0.005 of a head (papers/004 listing 5.1).
+const SHRINK_MM: f32 = 1.2;
 
 /// A light as the shader reads it; the fields are described there.
 #[repr(C)]
@@ -57,6 +106,7 @@ pub(crate) struct Params {
     pub(crate) environment_levels: f32,
     pub(crate) has_maps: u32,
     pub(crate) wrinkle_map_count: u32,
+    pub(crate) transmit: [f32; 4],
     pub(crate) hair_color: [f32; 4],
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
@@ -101,6 +151,34 @@ pub(crate) struct Lighting<'a> {
     pub(crate) environment: Option<&'a Environment>,
     pub(crate) environment_intensity: f32,
     pub(crate) ids: &'a wgpu::TextureView,
+    pub(crate) transmittance: Option<&'a Transmittance>,
+}
+
+/// T(s) of a profile as a texture of one row.
+pub(crate) struct Transmittance {
+    table: wgpu::TextureView,
+    thickness_max_mm: f32,
+}
+
+impl Transmittance {
+    /// Samples T(s) of a profile.
+    ///
+    /// # Errors
+    /// The profile has no finite width.
+    pub(crate) fn new(gpu: &Gpu, profile: &Profile) -> Result<Self, RenderError> {
+        let table = TransmittanceTable::new(profile, TRANSMITTANCE_ENTRIES, None)?;
+        let mut texels: Vec<_> =
+            table.values.iter().map(|t| [t[0] as f32, t[1] as f32, t[2] as f32, 1.0]).collect();
+        // What is thicker than the table lets nothing through.
+        if let Some(last) = texels.last_mut() {
+            *last = [0.0; 4];
+        }
+        let size = [texels.len() as u32, 1];
+        Ok(Self {
+            table: crate::texture::upload_half(gpu, "transmittance", size, &[vec![texels]]),
+            thickness_max_mm: table.thickness_max_mm as f32,
+        })
+    }
 }
 
 /// What it reads of one head.
@@ -171,6 +249,9 @@ impl Shade {
             environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
             has_maps: u32::from(maps.is_some()),
             wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
+            transmit: lighting
+                .transmittance
+                .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),
             hair_color: maps.map_or([0.0; 4], |m| {
                 let [r, g, b] = m.hair_color_linear;
                 [r, g, b, 1.0]
@@ -194,6 +275,7 @@ impl Shade {
                 wgpu::BindingResource::Sampler(&self.trilinear_repeat),
                 wgpu::BindingResource::Sampler(&self.linear_clamp),
                 wgpu::BindingResource::Sampler(&self.compare),
+                texture(lighting.transmittance.map_or(&self.black, |t| &t.table)),
             ],
         );
         let head = gpu.bind(
