@@ -8,12 +8,13 @@ use serde::Serialize;
 
 use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
-use crate::head::HeadOnGpu;
+use crate::head::{GpuVertex, HeadOnGpu};
 use crate::passes::appearance::{Appearance, Blended};
 use crate::passes::compose::Compose;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
 use crate::passes::overlay::Overlay;
+use crate::passes::scatter::surface::{self, Skin, Surface};
 use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
 use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded, TransmitMethod, Transmittance};
 use crate::passes::shadow::{LightView, Shadow};
@@ -60,6 +61,8 @@ pub struct FrameStats {
     pub triangles: u64,
     /// Bytes of heads, buffers and images on the device.
     pub memory_bytes: u64,
+    /// Relative standard error of the diffuse light, for `reference-surface`.
+    pub scatter_noise: Option<f64>,
 }
 
 /// The view as view.wgsl reads it.
@@ -97,6 +100,8 @@ pub struct Renderer {
     targets: Option<Targets>,
     instances: Vec<Instance>,
     timer: PassTimer,
+    /// Whether the last frame's diffuse light is in `scattered` (or unscattered in `irradiance`).
+    is_scattered: bool,
 }
 
 /// Images between passes.
@@ -202,6 +207,7 @@ impl Renderer {
             targets: None,
             instances: Vec::new(),
             timer: PassTimer::new(&gpu),
+            is_scattered: false,
             gpu,
         };
         renderer.gpu.check()?;
@@ -238,7 +244,14 @@ impl Renderer {
             self.transmittance = Some((settings.profile.clone(), table));
         }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        self.record_frame(&mut encoder, scene, settings);
+        let view = self.record_light(&mut encoder, scene, settings);
+        let mut scatter_noise = None;
+        if let ScatterMethod::ReferenceSurface(batches) = settings.scatter {
+            self.gpu.queue.submit([encoder.finish()]);
+            encoder = self.gpu.device.create_command_encoder(&Default::default());
+            scatter_noise = self.integrate_surface(&mut encoder, scene, settings, &view, batches)?;
+        }
+        self.record_picture(&mut encoder, scene, settings, &view);
         self.gpu.queue.submit([encoder.finish()]);
         let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
         let rgba = self.gpu.read_texture(&targets.image)?;
@@ -249,6 +262,7 @@ impl Renderer {
                 .iter()
                 .map(|h| u64::from(h.head.opaque_triangles + h.head.overlay_triangles))
                 .sum(),
+            scatter_noise,
             memory_bytes: targets.bytes() + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>(),
         };
         Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
@@ -263,6 +277,19 @@ impl Renderer {
         let bytes = self.gpu.read_buffer(&instance.positions)?;
         let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
         Ok(points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect())
+    }
+
+    /// Diffuse light of the last frame before albedo: linear radiance of a white surface, a = scattering strength.
+    /// Rows from the top; with supersampling, the frame's own pixels.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_diffuse(&self) -> Result<Vec<[f32; 4]>, RenderError> {
+        let Some(targets) = &self.targets else { return Ok(Vec::new()) };
+        let image = if self.is_scattered { &targets.scattered } else { &targets.irradiance };
+        let halves: Vec<[half::f16; 4]> =
+            bytemuck::pod_collect_to_vec(&self.gpu.read_texture(image.texture())?);
+        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
     }
 
     fn check(&self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
@@ -344,12 +371,18 @@ impl Renderer {
         }
     }
 
-    /// Every pass of a frame, in order.
-    fn record_frame(&mut self, encoder: &mut wgpu::CommandEncoder, scene: &Scene<'_>, settings: &Settings) {
+    /// The passes of a frame in order, up to the light on each pixel; returns the view.
+    fn record_light(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+    ) -> wgpu::Buffer {
         let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let Some(targets) = &self.targets else { return };
+        let size = settings.size.map(|n| n * settings.supersampling);
+        let view = gpu.uniform("view", &view(scene, size));
+        let Some(targets) = &self.targets else { return view };
         timer.restart();
-        let view = gpu.uniform("view", &view(scene, targets.size));
         let heads: Vec<(&HeadOnGpu, &Instance)> =
             scene.heads.iter().map(|h| h.head).zip(&self.instances).collect();
         let drawn: Vec<_> = heads.iter().map(|(h, i)| (*h, &i.positions)).collect();
@@ -379,44 +412,90 @@ impl Renderer {
         }
         self.visibility.record(gpu, encoder, timer, &view, &drawn, &targets.ids, &targets.depth);
 
-        let shadows = targets.shadows.create_view(&wgpu::TextureViewDescriptor {
-            dimension: Some(wgpu::TextureViewDimension::D2Array),
-            ..Default::default()
-        });
-        let lighting = Lighting {
-            view: &view,
-            lights,
-            shadows: &shadows,
-            environment: scene.environment,
-            environment_intensity: scene.environment_intensity,
-            ids: &targets.ids,
-            transmittance: match (settings.transmit, settings.scatter) {
-                // The integral over the surface holds the light from behind.
-                (TransmitMethod::None, _) | (_, ScatterMethod::ReferenceSurface(_)) => None,
-                (TransmitMethod::ShadowDepth, _) => self.transmittance.as_ref().map(|(_, t)| t),
-            },
+        let shadows = crate::texture::array_of(&targets.shadows);
+        let transmittance = match (settings.transmit, settings.scatter) {
+            // The integral over the surface holds the light from behind.
+            (TransmitMethod::None, _) | (_, ScatterMethod::ReferenceSurface(_)) => None,
+            (TransmitMethod::ShadowDepth, _) => self.transmittance.as_ref().map(|(_, t)| t),
         };
+        let lighting = lighting(scene, &view, lights, targets, &shadows, transmittance);
         let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
         for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
-            let shaded = Shaded {
-                index: index as u32,
-                head,
-                positions: &buffers.positions,
-                frames: &buffers.frames,
-                blended: &buffers.blended,
-                hemoglobin_scale: instance.state.hemoglobin_scale,
-            };
+            let shaded = shaded(index, instance, head, buffers);
             self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
         }
 
+        view
+    }
+
+    /// The reference method, which waits for the device between batches.
+    fn integrate_surface(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        view: &wgpu::Buffer,
+        batches: u32,
+    ) -> Result<Option<f64>, RenderError> {
+        self.shade.prepare_samples(&self.gpu);
+        let gpu = &self.gpu;
+        let Some(targets) = &self.targets else { return Ok(None) };
+        let (lights, _) = place_lights(scene, &targets.shadows);
+        let shadows = crate::texture::array_of(&targets.shadows);
+        let lighting = lighting(scene, view, lights, targets, &shadows, None);
+        let inputs = surface::Inputs {
+            view,
+            ids: &targets.ids,
+            irradiance: &targets.irradiance,
+            depth: &targets.depth,
+            scattered: &targets.scattered,
+        };
+        let integral = Surface::new(gpu, &settings.profile, targets.size);
+        let aspect = targets.size[0] as f32 / targets.size[1] as f32;
+        let clip_from_world = scene.camera.clip_from_view(aspect) * scene.camera.view_from_world();
+        for (index, (instance, buffers)) in scene.heads.iter().zip(&self.instances).enumerate() {
+            let head = instance.head;
+            let triangles: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.triangles)?);
+            let vertices: Vec<GpuVertex> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.vertices)?);
+            let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&buffers.positions)?);
+            let points: Vec<Vec3> = points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect();
+            let point_of_vertex: Vec<u32> = vertices.iter().map(|v| v.point).collect();
+            let opaque = &triangles[..head.opaque_triangles as usize];
+            let skin = Skin::new(opaque, &point_of_vertex, &points, &clip_from_world, PICTURE_MARGIN);
+            let shaded = shaded(index, instance, head, buffers);
+            integral.add_head(gpu, &inputs, index as u32, &skin, batches, &mut |e, samples, light| {
+                let count = surface::BATCH as u32;
+                self.shade.record_samples(gpu, e, &lighting, &shaded, [samples, light], count);
+            })?;
+        }
+        integral.record_finish(gpu, encoder, &mut self.timer, &inputs);
+        integral.relative_noise(gpu)
+    }
+
+    /// The passes of a frame in order, from the light on each pixel to the image.
+    fn record_picture(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        view: &wgpu::Buffer,
+    ) {
+        let (gpu, timer) = (&self.gpu, &mut self.timer);
+        let Some(targets) = &self.targets else { return };
+        let heads: Vec<(&HeadOnGpu, &Instance)> =
+            scene.heads.iter().map(|h| h.head).zip(&self.instances).collect();
         let images = Images {
             irradiance: &targets.irradiance,
             depth: &targets.depth,
             scratch: &targets.scratch,
             scattered: &targets.scattered,
         };
-        let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view: &view };
-        let diffuse = self.scatter.record(recorder, &images);
+        let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view };
+        let diffuse = match settings.scatter {
+            ScatterMethod::ReferenceSurface(_) => &targets.scattered,
+            _ => self.scatter.record(recorder, &images),
+        };
+        self.is_scattered = settings.scatter != ScatterMethod::None;
 
         let inputs = [diffuse, &targets.albedo, &targets.direct, &targets.depth];
         self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
@@ -428,7 +507,7 @@ impl Renderer {
         if !overlays.is_empty() {
             let ambient = average_light(scene);
             let images = [&targets.depth, &targets.hdr];
-            self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
+            self.overlay.record(gpu, encoder, timer, view, ambient, &overlays, images);
         }
 
         let image = targets.image.create_view(&Default::default());
@@ -459,6 +538,44 @@ fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
         jitter: [0.0; 2],
         near: NEAR_METRES,
         light_count: scene.lights.len() as u32,
+    }
+}
+
+/// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
+const PICTURE_MARGIN: f32 = 1.25;
+
+fn lighting<'a>(
+    scene: &Scene<'a>,
+    view: &'a wgpu::Buffer,
+    lights: [GpuLight; MAX_LIGHTS],
+    targets: &'a Targets,
+    shadows: &'a wgpu::TextureView,
+    transmittance: Option<&'a Transmittance>,
+) -> Lighting<'a> {
+    Lighting {
+        view,
+        lights,
+        shadows,
+        environment: scene.environment,
+        environment_intensity: scene.environment_intensity,
+        ids: &targets.ids,
+        transmittance,
+    }
+}
+
+fn shaded<'a>(
+    index: usize,
+    instance: &crate::scene::HeadInstance<'_>,
+    head: &'a HeadOnGpu,
+    buffers: &'a Instance,
+) -> Shaded<'a> {
+    Shaded {
+        index: index as u32,
+        head,
+        positions: &buffers.positions,
+        frames: &buffers.frames,
+        blended: &buffers.blended,
+        hemoglobin_scale: instance.state.hemoglobin_scale,
     }
 }
 

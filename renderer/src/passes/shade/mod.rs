@@ -44,6 +44,15 @@ pub(crate) const SHADER: &str = concat!(
     include_str!("shade.wgsl")
 );
 
+/// WGSL of the pass that lights points of the surface.
+pub(crate) const SAMPLES_SHADER: &str = concat!(
+    include_str!("../../shared/view.wgsl"),
+    include_str!("../../shared/math.wgsl"),
+    include_str!("../../shared/surface.wgsl"),
+    include_str!("shade.wgsl"),
+    include_str!("light_samples.wgsl")
+);
+
 /// How light passes through thin parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TransmitMethod {
@@ -194,6 +203,8 @@ pub(crate) struct Shaded<'a> {
 /// The pipeline of the pass.
 pub(crate) struct Shade {
     pipeline: wgpu::ComputePipeline,
+    /// Made by the first frame that lights points of the surface.
+    samples_pipeline: Option<wgpu::ComputePipeline>,
     trilinear_repeat: wgpu::Sampler,
     linear_clamp: wgpu::Sampler,
     compare: wgpu::Sampler,
@@ -212,6 +223,7 @@ impl Shade {
         let black = crate::texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]);
         Self {
             pipeline: gpu.compute_pipeline("shade", SHADER, "shade"),
+            samples_pipeline: None,
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
                 label: Some("trilinear repeat"),
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -240,25 +252,7 @@ impl Shade {
         outputs: [&wgpu::TextureView; 3],
     ) {
         let maps = shaded.head.maps.as_ref();
-        let params = Params {
-            slope_scale: 1.0,
-            wrinkle_strength: 1.0,
-            hemoglobin_scale: shaded.hemoglobin_scale,
-            head: shaded.index,
-            environment_intensity: lighting.environment_intensity,
-            environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
-            has_maps: u32::from(maps.is_some()),
-            wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
-            transmit: lighting
-                .transmittance
-                .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),
-            hair_color: maps.map_or([0.0; 4], |m| {
-                let [r, g, b] = m.hair_color_linear;
-                [r, g, b, 1.0]
-            }),
-            harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
-            lights: lighting.lights,
-        };
+        let params = params(lighting, shaded);
         let params = gpu.uniform("shade", &params);
         let texture = wgpu::BindingResource::TextureView;
         let environment = lighting.environment.map_or(&self.black, |e| &e.filtered);
@@ -304,5 +298,97 @@ impl Shade {
         pass.set_bind_group(2, &targets, &[]);
         let size = outputs[0].texture().size();
         pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+    }
+
+    /// Makes what [`Shade::record_samples`] needs.
+    pub(crate) fn prepare_samples(&mut self, gpu: &Gpu) {
+        self.samples_pipeline
+            .get_or_insert_with(|| gpu.compute_pipeline("light samples", SAMPLES_SHADER, "light_samples"));
+    }
+
+    /// Diffuse light at `count` points of a head's surface.
+    pub(crate) fn record_samples(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        lighting: &Lighting<'_>,
+        shaded: &Shaded<'_>,
+        [samples, light]: [&wgpu::Buffer; 2],
+        count: u32,
+    ) {
+        let Some(pipeline) = &self.samples_pipeline else { return };
+        let maps = shaded.head.maps.as_ref();
+        let params = gpu.uniform("light samples", &params(lighting, shaded));
+        let texture = wgpu::BindingResource::TextureView;
+        let sampler = wgpu::BindingResource::Sampler;
+        let bind = |group: u32, resources: Vec<(u32, wgpu::BindingResource<'_>)>| {
+            let entries: Vec<_> = resources
+                .into_iter()
+                .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+                .collect();
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("light samples"),
+                layout: &pipeline.get_bind_group_layout(group),
+                entries: &entries,
+            })
+        };
+        let frame = bind(
+            0,
+            vec![
+                (0, lighting.view.as_entire_binding()),
+                (1, params.as_entire_binding()),
+                (3, texture(lighting.shadows)),
+                (5, sampler(&self.trilinear_repeat)),
+                (6, sampler(&self.linear_clamp)),
+                (7, sampler(&self.compare)),
+            ],
+        );
+        let head = bind(
+            1,
+            vec![
+                (0, shaded.positions.as_entire_binding()),
+                (1, shaded.head.vertices.as_entire_binding()),
+                (2, shaded.head.triangles.as_entire_binding()),
+                (3, shaded.frames.as_entire_binding()),
+                (4, texture(maps.map_or(&self.black, |m| &m.skin))),
+                (5, texture(maps.map_or(&self.black, |m| &m.gloss))),
+                (6, texture(maps.map_or(&self.black, |m| &m.slopes))),
+                (7, texture(maps.map_or(&self.black_array, |m| &m.wrinkles))),
+                (8, texture(&shaded.blended.blood)),
+                (9, texture(&shaded.blended.wrinkles)),
+                (10, texture(&shaded.head.skin_color)),
+            ],
+        );
+        let data = bind(2, vec![(3, samples.as_entire_binding()), (4, light.as_entire_binding())]);
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &frame, &[]);
+        pass.set_bind_group(1, &head, &[]);
+        pass.set_bind_group(2, &data, &[]);
+        pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
+    }
+}
+
+/// Numbers of the pass for one head.
+fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
+    let maps = shaded.head.maps.as_ref();
+    Params {
+        slope_scale: 1.0,
+        wrinkle_strength: 1.0,
+        hemoglobin_scale: shaded.hemoglobin_scale,
+        head: shaded.index,
+        environment_intensity: lighting.environment_intensity,
+        environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
+        has_maps: u32::from(maps.is_some()),
+        wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
+        transmit: lighting
+            .transmittance
+            .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),
+        hair_color: maps.map_or([0.0; 4], |m| {
+            let [r, g, b] = m.hair_color_linear;
+            [r, g, b, 1.0]
+        }),
+        harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
+        lights: lighting.lights,
     }
 }

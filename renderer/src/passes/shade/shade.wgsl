@@ -493,9 +493,10 @@ fn transmitted(surface: Surface, turn: f32) -> vec3f {
             let at = center + THICKNESS_RADIUS / across * vogel_disk(tap, THICKNESS_SAMPLES, turn);
             let texel = vec2i(clamp(at, vec2f(0.0), vec2f(0.9999)) * resolution);
             let entry = shadow_metres(light, textureLoad(shadows, texel, i32(light.shape.y), 0));
-            let thickness_mm = 1e3 * max(receiver - entry, 0.0) + params.transmit.y * max(through, 0.0);
-            passed += transmittance_at(thickness_mm);
-            mean_mm += thickness_mm;
+            // Negative where the ray passes beside the surface, as it does along the terminator: nothing comes through.
+            let thickness_mm = 1e3 * (receiver - entry) + params.transmit.y * max(through, 0.0);
+            passed += select(vec3f(0.0), transmittance_at(thickness_mm), thickness_mm > 0.0);
+            mean_mm += max(thickness_mm, 0.0);
         }
         passed /= f32(THICKNESS_SAMPLES);
         sum += lit.irradiance * max(WRAP + through, 0.0) * passed / PI;
