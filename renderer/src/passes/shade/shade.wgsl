@@ -488,7 +488,7 @@ fn transmitted(surface: Surface, turn: f32) -> vec3f {
         let center = ndc.xy * vec2f(0.5, -0.5) + 0.5;
         let resolution = f32(textureDimensions(shadows).x);
         var passed = vec3f(0.0);
-        var mean_mm = 0.0;
+        var thickest_mm = 0.0;
         for (var tap = 0u; tap < THICKNESS_SAMPLES; tap++) {
             let at = center + THICKNESS_RADIUS / across * vogel_disk(tap, THICKNESS_SAMPLES, turn);
             let texel = vec2i(clamp(at, vec2f(0.0), vec2f(0.9999)) * resolution);
@@ -496,13 +496,12 @@ fn transmitted(surface: Surface, turn: f32) -> vec3f {
             // Negative where the ray passes beside the surface, as it does along the terminator: nothing comes through.
             let thickness_mm = 1e3 * (receiver - entry) + params.transmit.y * max(through, 0.0);
             passed += select(vec3f(0.0), transmittance_at(thickness_mm), thickness_mm > 0.0);
-            mean_mm += max(thickness_mm, 0.0);
+            thickest_mm = max(thickest_mm, thickness_mm);
         }
         passed /= f32(THICKNESS_SAMPLES);
         sum += lit.irradiance * max(WRAP + through, 0.0) * passed / PI;
-        if through > 0.0 {
-            // Of a slab with parallel sides.
-            thinnest_mm = min(thinnest_mm, through * mean_mm / f32(THICKNESS_SAMPLES));
+        if through > 0.0 && thickest_mm > params.transmit.y * through {
+            thinnest_mm = min(thinnest_mm, thickest_mm);
         }
     }
     if view.has_environment == 1u {
