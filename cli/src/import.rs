@@ -156,7 +156,10 @@ fn makehuman(arguments: &Makehuman) -> Outcome {
     options.muscle = arguments.muscle.unwrap_or(options.muscle);
     if let Some(mix) = &arguments.ethnicity {
         let [a, b, c] = mix[..] else {
-            return Err(Failure::input(format!("--ethnicity: found {} numbers, expected 3 such as 0.7,0.1,0.2", mix.len())));
+            return Err(Failure::input(format!(
+                "--ethnicity: found {} numbers, expected 3 such as 0.7,0.1,0.2",
+                mix.len()
+            )));
         };
         options.ethnicity = [a, b, c];
     }

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
-use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, Settings, antialias};
+use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, Settings, TransmitMethod, antialias};
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{Head, Material};
@@ -46,6 +46,9 @@ pub(crate) struct Arguments {
     /// burley-disk:N (N from 4 to 256), reference-screen, reference-surface
     #[arg(long, default_value = "separable:17", value_name = "METHOD")]
     pub(crate) scatter: ScatterMethod,
+    /// Light through thin parts: none or shadow-depth
+    #[arg(long, default_value = "shadow-depth", value_name = "METHOD")]
+    pub(crate) transmit: TransmitMethod,
     /// Antialiasing: none, mlaa, smaa-1x, smaa-s2x, smaa-t2x, smaa-4x, or ssaa:N with N x N samples a pixel
     #[arg(long, default_value = "smaa-s2x", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
@@ -206,6 +209,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         "frames": frames.len(),
         "framesDrawn": drawn.len(),
         "scatter": arguments.scatter.to_string(),
+        "transmit": arguments.transmit.to_string(),
         "antialias": format!("{:?}", arguments.antialias),
         "secondsToFirstFrame": first_frame_s,
         "secondsPerFrame": median(&mut drawn),
@@ -242,6 +246,7 @@ fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
     Ok(Settings {
         size,
         scatter: arguments.scatter,
+        transmit: arguments.transmit,
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(mode, antialias::Preset::High),
         supersampling,
@@ -258,6 +263,7 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
         "sequence": job.sequence,
         "size": size,
         "scatter": arguments.scatter.to_string(),
+        "transmit": arguments.transmit.to_string(),
         "antialias": format!("{:?}", arguments.antialias),
         "exposure": arguments.exposure,
         "program": env!("CARGO_PKG_VERSION"),

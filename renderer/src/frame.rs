@@ -8,15 +8,16 @@ use serde::Serialize;
 
 use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
-use crate::head::HeadOnGpu;
+use crate::head::GpuVertex;
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::{Appearance, Blended};
 use crate::passes::compose::Compose;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
 use crate::passes::overlay::Overlay;
+use crate::passes::scatter::surface::{self, Skin, Surface};
 use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
-use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded};
+use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded, TransmitMethod, Transmittance};
 use crate::passes::shadow::{LightView, Shadow};
 use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
 use crate::passes::velocity::{Moving, Velocity};
@@ -30,7 +31,9 @@ pub struct Settings {
     pub size: [u32; 2],
     /// How light scatters in skin.
     pub scatter: ScatterMethod,
-    /// How far it does, for every method.
+    /// How light passes through thin parts.
+    pub transmit: TransmitMethod,
+    /// How far light goes in skin, for every method.
     pub profile: Arc<Profile>,
     /// Antialiasing of the displayed image.
     pub antialias: antialias::Settings,
@@ -58,6 +61,8 @@ pub struct Image {
 pub struct FrameStats {
     /// GPU milliseconds of each pass, in order; empty where the adapter has no timestamps.
     pub passes_ms: Vec<(&'static str, f64)>,
+    /// Relative standard error of the light that `reference-surface` integrated; `None` for other methods.
+    pub scatter_noise: Option<f64>,
     /// Triangles of all heads.
     pub triangles: u64,
     /// Bytes of heads, buffers and images on the device.
@@ -99,9 +104,12 @@ pub struct Renderer {
     display: Display,
     velocity: Velocity,
     antialias: Option<Antialias>,
+    transmittance: Option<(Arc<Profile>, Transmittance)>,
     targets: Option<Targets>,
     instances: Vec<Instance>,
     timer: PassTimer,
+    /// Whether the last frame's diffuse light is in `scattered` (or unscattered in `irradiance`).
+    is_scattered: bool,
     /// What antialiasing over time remembers: the only thing that one frame leaves to the next.
     past: Past,
 }
@@ -247,9 +255,11 @@ impl Renderer {
             display: Display::new(&gpu),
             velocity: Velocity::new(&gpu),
             antialias: None,
+            transmittance: None,
             targets: None,
             instances: Vec::new(),
             timer: PassTimer::new(&gpu),
+            is_scattered: false,
             past: Past::default(),
             gpu,
         };
@@ -292,8 +302,14 @@ impl Renderer {
         }
         self.fit_instances(scene);
         self.scatter.prepare(&self.gpu, settings.scatter, &settings.profile)?;
+        if settings.transmit == TransmitMethod::ShadowDepth
+            && self.transmittance.as_ref().is_none_or(|(p, _)| *p != settings.profile)
+        {
+            let table = Transmittance::new(&self.gpu, &settings.profile)?;
+            self.transmittance = Some((settings.profile.clone(), table));
+        }
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        self.record_frame(&mut encoder, scene, settings)?;
+        let scatter_noise = self.record_frame(&mut encoder, scene, settings)?;
         self.gpu.queue.submit([encoder.finish()]);
         let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
         let image =
@@ -302,6 +318,7 @@ impl Renderer {
         let heads = scene.heads.iter().map(|h| h.head);
         let stats = FrameStats {
             passes_ms: self.timer.read(&self.gpu)?,
+            scatter_noise,
             triangles: heads.clone().map(|h| u64::from(h.opaque_triangles + h.overlay_triangles)).sum(),
             memory_bytes: targets.bytes()
                 + self.antialias.as_ref().map_or(0, Antialias::memory_bytes)
@@ -343,6 +360,19 @@ impl Renderer {
         let frames: Vec<[f32; 8]> = bytemuck::pod_collect_to_vec(&bytes);
         let frame = |f: [f32; 8]| (Vec3::new(f[0], f[1], f[2]), glam::Vec4::new(f[4], f[5], f[6], f[7]));
         Ok(frames.into_iter().map(frame).collect())
+    }
+
+    /// Diffuse light of the last frame before albedo: linear radiance of a white surface, a = scattering strength.
+    /// Rows from the top; with supersampling, the frame's own pixels.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_diffuse(&self) -> Result<Vec<[f32; 4]>, RenderError> {
+        let Some(targets) = &self.targets else { return Ok(Vec::new()) };
+        let image = if self.is_scattered { &targets.scattered } else { &targets.irradiance };
+        let halves: Vec<[half::f16; 4]> =
+            bytemuck::pod_collect_to_vec(&self.gpu.read_texture(image.texture())?);
+        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
     }
 
     fn check(&self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
@@ -426,142 +456,271 @@ impl Renderer {
         }
     }
 
-    /// Every pass of a frame, in order.
+    /// Every pass of a frame, in order. Returns the noise of `reference-surface`, if that scattered the light.
     fn record_frame(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+    ) -> Result<Option<f64>, RenderError> {
+        let lights = self.record_geometry(encoder, scene);
+        let subsamples = settings.antialias.mode.subsamples(self.past.frames);
+        let share = 1.0 / subsamples.len() as f32;
+        let shading_jitter = subsamples
+            .iter()
+            .fold([0.0; 2], |sum, s| [sum[0] - share * s.position_px[0], sum[1] - share * s.position_px[1]]);
+        let mut noise = None;
+        for (sample, subsample) in subsamples.iter().enumerate() {
+            // A camera reaches a place in the pixel by moving the image the other way.
+            let jitter = subsample.position_px.map(|p| -p);
+            let view =
+                view(scene, settings.frame_size(), [jitter, shading_jitter], self.past.clip_from_world);
+            let view = self.gpu.uniform("view", &view);
+            self.record_light(encoder, scene, settings, &view, &lights, sample);
+            if let ScatterMethod::ReferenceSurface(batches) = settings.scatter {
+                let next = self.gpu.device.create_command_encoder(&Default::default());
+                self.gpu.queue.submit([std::mem::replace(encoder, next).finish()]);
+                noise = self.integrate_surface(encoder, scene, settings, &view, &lights, batches, sample)?;
+            }
+            self.record_picture(encoder, scene, settings, &view, sample);
+        }
+        self.record_antialias(encoder, scene, settings)?;
+        self.timer.resolve(encoder);
+        Ok(noise)
+    }
+
+    /// What all samples of a frame share: deformation, colour and wrinkles of the moment, shadow maps.
+    fn record_geometry(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+    ) -> [GpuLight; MAX_LIGHTS] {
+        let (gpu, timer) = (&self.gpu, &mut self.timer);
+        let Some(targets) = &self.targets else { return bytemuck::Zeroable::zeroed() };
+        timer.restart();
+        let heads = scene.heads.iter().zip(&self.instances);
+        for (instance, buffers) in heads.clone() {
+            let (head, state) = (instance.head, instance.state);
+            let weights = gpu.storage("shape weights", &state.shapes);
+            let place = world_from_head(instance);
+            self.morph.record(gpu, encoder, timer, head, place, &weights, &buffers.positions);
+            self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
+            if let Some(maps) = &head.maps {
+                let (distributions, zones) = (&state.distributions, &state.zones);
+                self.appearance.record(gpu, encoder, timer, maps, distributions, zones, &buffers.blended);
+            }
+        }
+        let drawn: Vec<_> = heads.map(|(h, i)| (h.head, &i.positions)).collect();
+        let (lights, layers) = place_lights(scene, &targets.shadows);
+        for (light, layer) in &layers {
+            self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
+        }
+        lights
+    }
+
+    /// What a sample of each pixel sees, and the light on it.
+    fn record_light(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        view: &wgpu::Buffer,
+        lights: &[GpuLight; MAX_LIGHTS],
+        sample: usize,
+    ) {
+        let (gpu, timer) = (&self.gpu, &mut self.timer);
+        let Some(targets) = &self.targets else { return };
+        let images = &targets.samples[sample];
+        let heads = scene.heads.iter().zip(&self.instances);
+        let drawn: Vec<_> = heads.clone().map(|(h, i)| (h.head, &i.positions)).collect();
+        self.visibility.record(gpu, encoder, timer, view, &drawn, &images.ids, &images.depth);
+
+        let shadows = crate::texture::array_of(&targets.shadows);
+        let transmittance = match (settings.transmit, settings.scatter) {
+            // The integral over the surface holds the light from behind.
+            (TransmitMethod::None, _) | (_, ScatterMethod::ReferenceSurface(_)) => None,
+            (TransmitMethod::ShadowDepth, _) => self.transmittance.as_ref().map(|(_, t)| t),
+        };
+        let lighting = lighting(scene, view, lights, targets, sample, &shadows, transmittance);
+        let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
+        for (index, (instance, buffers)) in heads.clone().enumerate() {
+            let shaded = shaded(index, instance, buffers);
+            self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
+        }
+        if let Some(velocity) = targets.velocity.as_ref().filter(|_| sample == 0) {
+            // The first frame has nothing before it: its positions stand for the previous ones.
+            let known = self.past.clip_from_world.is_some();
+            let moving: Vec<_> = heads
+                .map(|(h, i)| Moving {
+                    head: h.head,
+                    positions: &i.positions,
+                    previous_positions: if known { &i.previous_positions } else { &i.positions },
+                })
+                .collect();
+            self.velocity.record(gpu, encoder, timer, view, &moving, &images.ids, velocity);
+        }
+    }
+
+    /// The reference method, which waits for the device between batches.
+    fn integrate_surface(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        view: &wgpu::Buffer,
+        lights: &[GpuLight; MAX_LIGHTS],
+        batches: u32,
+        sample: usize,
+    ) -> Result<Option<f64>, RenderError> {
+        self.shade.prepare_samples(&self.gpu);
+        let gpu = &self.gpu;
+        let Some(targets) = &self.targets else { return Ok(None) };
+        let shadows = crate::texture::array_of(&targets.shadows);
+        let lighting = lighting(scene, view, lights, targets, sample, &shadows, None);
+        let inputs = surface::Inputs {
+            view,
+            ids: &targets.samples[sample].ids,
+            irradiance: &targets.irradiance,
+            depth: &targets.samples[sample].depth,
+            scattered: &targets.scattered,
+        };
+        let integral = Surface::new(gpu, &settings.profile, targets.size);
+        let aspect = targets.size[0] as f32 / targets.size[1] as f32;
+        let clip_from_world = scene.camera.clip_from_view(aspect) * scene.camera.view_from_world();
+        for (index, (instance, buffers)) in scene.heads.iter().zip(&self.instances).enumerate() {
+            let head = instance.head;
+            let triangles: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.triangles)?);
+            let vertices: Vec<GpuVertex> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.vertices)?);
+            let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&buffers.positions)?);
+            let points: Vec<Vec3> = points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect();
+            let point_of_vertex: Vec<u32> = vertices.iter().map(|v| v.point).collect();
+            let opaque = &triangles[..head.opaque_triangles as usize];
+            let skin = Skin::new(opaque, &point_of_vertex, &points, &clip_from_world, PICTURE_MARGIN);
+            let shaded = shaded(index, instance, buffers);
+            integral.add_head(gpu, &inputs, index as u32, &skin, batches, &mut |e, samples, light| {
+                let count = surface::BATCH as u32;
+                self.shade.record_samples(gpu, e, &lighting, &shaded, [samples, light], count);
+            })?;
+        }
+        integral.record_finish(gpu, encoder, &mut self.timer, &inputs);
+        integral.relative_noise(gpu)
+    }
+
+    /// From the light on a sample of each pixel to its displayed colour.
+    fn record_picture(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        view: &wgpu::Buffer,
+        sample: usize,
+    ) {
+        let (gpu, timer) = (&self.gpu, &mut self.timer);
+        let Some(targets) = &self.targets else { return };
+        let sample = &targets.samples[sample];
+        let images = Images {
+            irradiance: &targets.irradiance,
+            depth: &sample.depth,
+            scratch: &targets.scratch,
+            scattered: &targets.scattered,
+        };
+        let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view };
+        let diffuse = match settings.scatter {
+            ScatterMethod::ReferenceSurface(_) => &targets.scattered,
+            _ => self.scatter.record(recorder, &images),
+        };
+        self.is_scattered = settings.scatter != ScatterMethod::None;
+
+        let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
+        self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
+        let overlays: Vec<_> = scene
+            .heads
+            .iter()
+            .zip(&self.instances)
+            .filter(|(h, _)| h.head.overlay_triangles > 0)
+            .map(|(h, i)| (h.head, &i.positions, &i.frames))
+            .collect();
+        if !overlays.is_empty() {
+            let ambient = average_light(scene);
+            let images = [&sample.depth, &targets.hdr];
+            self.overlay.record(gpu, encoder, timer, view, ambient, &overlays, images);
+        }
+        let (exposure, samples) = (settings.exposure, settings.supersampling);
+        self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
+    }
+
+    /// From displayed samples to the image.
+    fn record_antialias(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         scene: &Scene<'_>,
         settings: &Settings,
     ) -> Result<(), RenderError> {
         let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let Some(targets) = &self.targets else { return Ok(()) };
-        timer.restart();
-        let heads: Vec<(&HeadOnGpu, &Instance)> =
-            scene.heads.iter().map(|h| h.head).zip(&self.instances).collect();
-        let drawn: Vec<_> = heads.iter().map(|(h, i)| (*h, &i.positions)).collect();
-
-        for (instance, (head, buffers)) in scene.heads.iter().zip(&heads) {
-            let weights = gpu.storage("shape weights", &instance.state.shapes);
-            let place = world_from_head(instance);
-            self.morph.record(gpu, encoder, timer, head, place, &weights, &buffers.positions);
-            self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
-            if let Some(maps) = &head.maps {
-                let state = instance.state;
-                let (distributions, zones) = (&state.distributions, &state.zones);
-                self.appearance.record(gpu, encoder, timer, maps, distributions, zones, &buffers.blended);
-            }
+        let (Some(targets), Some(antialias)) = (&self.targets, &self.antialias) else { return Ok(()) };
+        let colors: Vec<_> = targets.samples.iter().map(|s| &s.displayed).collect();
+        let depths: Vec<_> = targets.samples.iter().map(|s| &s.depth).collect();
+        let inputs = antialias::Inputs {
+            colors: &colors,
+            depths: if settings.antialias.needs_depth() { &depths } else { &[] },
+            velocity: targets.velocity.as_ref(),
+            frame: self.past.frames,
+        };
+        let image = targets.image.create_view(&Default::default());
+        let is_temporal = settings.antialias.mode.is_temporal();
+        if is_temporal && self.past.history.is_none() {
+            self.past.history = Some(History::new(gpu, settings.size));
         }
-
-        let (lights, layers) = place_lights(scene, &targets.shadows);
-        for (light, layer) in &layers {
-            self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
+        let history = if is_temporal { self.past.history.as_mut() } else { None };
+        antialias.record(gpu, encoder, timer, &inputs, &image, history)?;
+        if is_temporal {
+            for buffers in self.instances.iter().take(scene.heads.len()) {
+                let (from, to) = (&buffers.positions, &buffers.previous_positions);
+                encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+            }
+            let aspect = targets.size[0] as f32 / targets.size[1] as f32;
+            let camera = &scene.camera;
+            self.past.clip_from_world = Some(camera.clip_from_view(aspect) * camera.view_from_world());
+            self.past.frames += 1;
         }
-        let shadows = crate::texture::array_view_of(&targets.shadows);
-
-        let subsamples = settings.antialias.mode.subsamples(self.past.frames);
-        let share = 1.0 / subsamples.len() as f32;
-        let shading_jitter = subsamples
-            .iter()
-            .fold([0.0; 2], |sum, s| [sum[0] - share * s.position_px[0], sum[1] - share * s.position_px[1]]);
-        for (sample, subsample) in targets.samples.iter().zip(subsamples) {
-            let first = &targets.samples[0];
-            // A camera reaches a place in the pixel by moving the image the other way.
-            let jitter = subsample.position_px.map(|p| -p);
-            let view = view(scene, targets.size, [jitter, shading_jitter], self.past.clip_from_world);
-            let view = gpu.uniform("view", &view);
-            self.visibility.record(gpu, encoder, timer, &view, &drawn, &sample.ids, &sample.depth);
-
-            let lighting = Lighting {
-                view: &view,
-                lights,
-                shadows: &shadows,
-                environment: scene.environment,
-                environment_intensity: scene.environment_intensity,
-                ids: &sample.ids,
-                depth: &sample.depth,
-                first: (!std::ptr::eq(sample, first)).then_some((&first.ids, &first.depth)),
-            };
-            let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
-            for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
-                let shaded = Shaded {
-                    index: index as u32,
-                    head,
-                    positions: &buffers.positions,
-                    frames: &buffers.frames,
-                    blended: &buffers.blended,
-                    hemoglobin_scale: instance.state.hemoglobin_scale,
-                };
-                self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
-            }
-
-            let images = Images {
-                irradiance: &targets.irradiance,
-                depth: &sample.depth,
-                scratch: &targets.scratch,
-                scattered: &targets.scattered,
-            };
-            let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view: &view };
-            let diffuse = self.scatter.record(recorder, &images);
-
-            let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
-            self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
-            let overlays: Vec<_> = heads
-                .iter()
-                .filter(|(h, _)| h.overlay_triangles > 0)
-                .map(|(h, i)| (*h, &i.positions, &i.frames))
-                .collect();
-            if !overlays.is_empty() {
-                let ambient = average_light(scene);
-                let images = [&sample.depth, &targets.hdr];
-                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
-            }
-
-            let (exposure, samples) = (settings.exposure, settings.supersampling);
-            self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
-            if let Some(velocity) = targets.velocity.as_ref().filter(|_| std::ptr::eq(sample, first)) {
-                // The first frame has nothing before it: its positions stand for the previous ones.
-                let known = self.past.clip_from_world.is_some();
-                let moving: Vec<_> = heads
-                    .iter()
-                    .map(|(head, i)| Moving {
-                        head,
-                        positions: &i.positions,
-                        previous_positions: if known { &i.previous_positions } else { &i.positions },
-                    })
-                    .collect();
-                self.velocity.record(gpu, encoder, timer, &view, &moving, &sample.ids, velocity);
-            }
-        }
-
-        if let Some(antialias) = &self.antialias {
-            let colors: Vec<_> = targets.samples.iter().map(|s| &s.displayed).collect();
-            let depths: Vec<_> = targets.samples.iter().map(|s| &s.depth).collect();
-            let inputs = antialias::Inputs {
-                colors: &colors,
-                depths: if settings.antialias.needs_depth() { &depths } else { &[] },
-                velocity: targets.velocity.as_ref(),
-                frame: self.past.frames,
-            };
-            let image = targets.image.create_view(&Default::default());
-            let is_temporal = settings.antialias.mode.is_temporal();
-            if is_temporal && self.past.history.is_none() {
-                self.past.history = Some(History::new(gpu, settings.size));
-            }
-            let history = if is_temporal { self.past.history.as_mut() } else { None };
-            antialias.record(gpu, encoder, timer, &inputs, &image, history)?;
-            if is_temporal {
-                for (_, buffers) in &heads {
-                    let (from, to) = (&buffers.positions, &buffers.previous_positions);
-                    encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
-                }
-                let aspect = targets.size[0] as f32 / targets.size[1] as f32;
-                let camera = &scene.camera;
-                self.past.clip_from_world = Some(camera.clip_from_view(aspect) * camera.view_from_world());
-                self.past.frames += 1;
-            }
-        }
-        timer.resolve(encoder);
         Ok(())
+    }
+}
+
+/// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
+const PICTURE_MARGIN: f32 = 1.25;
+
+fn lighting<'a>(
+    scene: &Scene<'a>,
+    view: &'a wgpu::Buffer,
+    lights: &[GpuLight; MAX_LIGHTS],
+    targets: &'a Targets,
+    sample: usize,
+    shadows: &'a wgpu::TextureView,
+    transmittance: Option<&'a Transmittance>,
+) -> Lighting<'a> {
+    let first = &targets.samples[0];
+    Lighting {
+        view,
+        lights: *lights,
+        shadows,
+        environment: scene.environment,
+        environment_intensity: scene.environment_intensity,
+        ids: &targets.samples[sample].ids,
+        depth: &targets.samples[sample].depth,
+        first: (sample > 0).then_some((&first.ids, &first.depth)),
+        transmittance,
+    }
+}
+
+fn shaded<'a>(index: usize, instance: &crate::scene::HeadInstance<'a>, buffers: &'a Instance) -> Shaded<'a> {
+    Shaded {
+        index: index as u32,
+        head: instance.head,
+        positions: &buffers.positions,
+        frames: &buffers.frames,
+        blended: &buffers.blended,
+        hemoglobin_scale: instance.state.hemoglobin_scale,
     }
 }
 

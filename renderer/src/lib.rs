@@ -39,4 +39,5 @@ pub use head::{
 };
 pub use passes::antialias;
 pub use passes::scatter::ScatterMethod;
+pub use passes::shade::TransmitMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

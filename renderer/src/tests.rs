@@ -18,7 +18,7 @@ use crate::passes::{
 use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
 use crate::{
     Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
-    Renderer, ScatterMethod, Scene, Settings,
+    Renderer, ScatterMethod, Scene, Settings, TransmitMethod,
 };
 
 #[test]
@@ -83,7 +83,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
         &offsets!(shade::Params; slope_scale as "slope_scale", wrinkle_strength as "wrinkle_strength",
             hemoglobin_scale as "hemoglobin_scale", head as "head",
             environment_intensity as "environment_intensity", environment_levels as "environment_levels",
-            has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", hair_color as "hair_color",
+            has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", transmit as "transmit", hair_color as "hair_color",
             is_second_sample as "is_second_sample", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
@@ -167,6 +167,7 @@ fn settings(size: [u32; 2]) -> Settings {
     Settings {
         size,
         scatter: ScatterMethod::Separable(17),
+        transmit: TransmitMethod::ShadowDepth,
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
         supersampling: 1,

@@ -49,6 +49,7 @@ fn kernel_and_cpu_agree_over_the_demo() -> Result<(), RenderError> {
     let settings = Settings {
         size: [16, 16],
         scatter: ScatterMethod::None,
+        transmit: TransmitMethod::None,
         profile: std::sync::Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
         supersampling: 1,

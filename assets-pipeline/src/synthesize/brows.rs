@@ -89,8 +89,9 @@ impl Hairs {
     fn cropped_strokes(&self, place: Vec3, density: f32) -> f32 {
         // Hair grows from the crown forwards and down: the direction of steepest descent, wandering a little.
         let away = (place - Vec3::new(6.0, 104.0, -48.0)).normalize_or(Vec3::Z);
-        let along = (away + 0.25 * Vec3::new(noise(place, 9.0, self.seed ^ 11), 0.0, noise(place, 9.0, self.seed ^ 12)))
-            .normalize_or(Vec3::Z);
+        let along = (away
+            + 0.25 * Vec3::new(noise(place, 9.0, self.seed ^ 11), 0.0, noise(place, 9.0, self.seed ^ 12)))
+        .normalize_or(Vec3::Z);
         // Space squeezed along the growth makes round features long: a stroke of 3 mm to a width of 0.25.
         let squeezed = |stretch: f32| place - along * along.dot(place) * (1.0 - 1.0 / stretch);
         let width_mm = 0.34f32.max(1.5 * self.finest_mm);

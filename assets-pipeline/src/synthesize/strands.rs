@@ -55,7 +55,8 @@ impl Chart {
                 (*c - p).perp_dot(*a - p) / area,
                 (*a - p).perp_dot(*b - p) / area,
             );
-            (area.abs() > 1e-12 && weights.min_element() >= -1e-4).then_some(Anchor { points: *points, weights })
+            (area.abs() > 1e-12 && weights.min_element() >= -1e-4)
+                .then_some(Anchor { points: *points, weights })
         })
     }
 }
@@ -133,7 +134,8 @@ fn lash_strands(chart: &Chart, count: usize, upper: bool) -> Vec<Strand> {
         // Shorter towards the inner corner, whichever end that is, and none at the very ends.
         let ends = (4.0 * u * (1.0 - u)).powf(0.35);
         let knots = [0.0f32, 0.4, 1.0].map(|t| {
-            let at = Vec2::new((u + lean * t * t).clamp(0.002, 0.998), (length * ends * t).clamp(0.002, 0.998));
+            let at =
+                Vec2::new((u + lean * t * t).clamp(0.002, 0.998), (length * ends * t).clamp(0.002, 0.998));
             chart.at(at).map(|a| (a, 0.0))
         });
         strands.extend(knots.into_iter().collect::<Option<_>>().map(|knots| Strand { knots }));
@@ -179,7 +181,8 @@ fn add_part(head: &mut Head, name: &str, material: Material, strands: &[Strand])
         }
     }
     for shape in &mut head.shapes {
-        let moved: HashMap<u32, Vec3> = shape.points.iter().copied().zip(shape.offsets.iter().copied()).collect();
+        let moved: HashMap<u32, Vec3> =
+            shape.points.iter().copied().zip(shape.offsets.iter().copied()).collect();
         for (i, anchor) in anchors.iter().enumerate() {
             let offset: Vec3 = (0..3)
                 .map(|k| anchor.weights[k] * moved.get(&anchor.points[k]).copied().unwrap_or_default())
@@ -205,7 +208,8 @@ fn remove_parts(head: &mut Head, gone: impl Fn(usize, &Part) -> bool) {
     let mesh = std::mem::take(&mut head.mesh);
     let mut new_vertex = vec![u32::MAX; mesh.vertices.len()];
     let mut used = vec![false; mesh.points.len()];
-    let kept: Vec<&Part> = mesh.parts.iter().enumerate().filter(|(i, p)| !gone(*i, p)).map(|(_, p)| p).collect();
+    let kept: Vec<&Part> =
+        mesh.parts.iter().enumerate().filter(|(i, p)| !gone(*i, p)).map(|(_, p)| p).collect();
     for part in &kept {
         for v in mesh.triangles[part.triangles.start as usize..part.triangles.end as usize].iter().flatten() {
             new_vertex[*v as usize] = 0;

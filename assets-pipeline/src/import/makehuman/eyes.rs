@@ -92,7 +92,9 @@ pub(super) fn clear_skin(mesh: &PolyMesh, shapes: &mut [Shape], eyes: &[Eye]) {
     for (eye, side) in eyes.iter().zip(["Left", "Right"]) {
         let used: Vec<(usize, f32)> = BUNCHED
             .iter()
-            .filter_map(|(name, w)| Some((shapes.iter().position(|s| s.name == format!("{name}{side}"))?, *w)))
+            .filter_map(|(name, w)| {
+                Some((shapes.iter().position(|s| s.name == format!("{name}{side}"))?, *w))
+            })
             .collect();
         let Some((cheek, weight)) = used.first().copied() else { continue };
         for (i, p) in mesh.points.iter().enumerate().filter(|(i, _)| on_skin[*i]) {

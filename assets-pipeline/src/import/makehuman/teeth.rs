@@ -35,7 +35,9 @@ pub(super) fn fit(mesh: &mut PolyMesh) {
         let faces: Vec<usize> =
             (0..mesh.face_count()).filter(|f| mesh.face_groups[*f] == index as u32).collect();
         let points: BTreeSet<u32> = faces.iter().flat_map(|f| mesh.face(*f)).map(|c| c.point).collect();
-        let Some(front) = points.iter().map(|p| mesh.points[*p as usize].z).reduce(f32::max) else { continue };
+        let Some(front) = points.iter().map(|p| mesh.points[*p as usize].z).reduce(f32::max) else {
+            continue;
+        };
         let incisors = points.iter().map(|p| mesh.points[*p as usize]).filter(|p| p.z > front - 0.008);
         let sign = if upper { 1.0 } else { -1.0 };
         let edge = sign * incisors.map(|p| sign * p.y).fold(f32::INFINITY, f32::min);

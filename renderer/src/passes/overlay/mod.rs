@@ -102,7 +102,9 @@ impl Overlay {
                 ambient: ambient.extend(0.0).to_array(),
                 first: head.opaque_triangles,
                 padding: [0; 3],
-                hair: Vec3::from(head.maps.as_ref().map_or([0.03; 3], |m| m.hair_color_linear)).extend(1.0).to_array(),
+                hair: Vec3::from(head.maps.as_ref().map_or([0.03; 3], |m| m.hair_color_linear))
+                    .extend(1.0)
+                    .to_array(),
             };
             let params = gpu.uniform("overlay", &params);
             let group = gpu.bind_layout(

@@ -4,7 +4,8 @@
 //! irradiance (a = strength), depth --the method of the frame--> scattered (rgba16f, linear Rec. 709)
 //! ```
 //!
-//! Each method is a file or folder of its own: `separable`, `gauss`, `jitter`, `disk`, and the reference `exact`.
+//! Each method is a file or folder of its own: `separable`, `gauss`, `jitter`, `disk`, and the references `exact` and
+//! `surface`.
 //! All keep to the same rules: kernels are in millimetres on the surface, projected with the depth, field of view and
 //! tilt at each pixel and scaled by its strength; a neighbour off the tangent plane of the centre, or one that is not
 //! skin, gives way to the centre; a pixel whose kernel is under half a pixel keeps its light; weights sum to one, so
@@ -27,6 +28,7 @@ pub(crate) mod jitter;
 pub(crate) mod line;
 mod method;
 pub(crate) mod separable;
+pub(crate) mod surface;
 
 #[cfg(test)]
 mod reference;

@@ -15,11 +15,21 @@
 //! Differs from the sources: slope variance that minification hides widens the Beckmann lobe (Toksvig 2005), and so
 //! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
 //!
-//! Does not: transmit light through thin parts, reflect one part of the head in another.
+//! Transmittance (papers/004 ch. 5): light through thin parts from the depth in shadow maps and T(s), added to the
+//! diffuse light that is scattered next. Lamps without shadows transmit nothing. For the environment, which has no
+//! shadow map, the thickness is that which a lamp behind the surface sees.
+//!
+//! Does not: reflect one part of the head in another.
+
+use std::fmt;
+use std::str::FromStr;
 
 use glam::{Mat4, Vec3};
+use rubor_rig::skin::profile::Profile;
+use rubor_rig::skin::transmittance::TransmittanceTable;
 
 use crate::environment::Environment;
+use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
 use crate::head::HeadOnGpu;
 use crate::passes::appearance::Blended;
@@ -36,6 +46,57 @@ pub(crate) const SHADER: &str = concat!(
     include_str!("mouth.wgsl"),
     include_str!("micro.wgsl")
 );
+
+/// WGSL of the pass that lights points of the surface.
+pub(crate) const SAMPLES_SHADER: &str = concat!(
+    include_str!("../../shared/view.wgsl"),
+    include_str!("../../shared/math.wgsl"),
+    include_str!("../../shared/surface.wgsl"),
+    include_str!("shade.wgsl"),
+    include_str!("eye.wgsl"),
+    include_str!("mouth.wgsl"),
+    include_str!("micro.wgsl"),
+    include_str!("light_samples.wgsl")
+);
+
+/// How light passes through thin parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TransmitMethod {
+    /// `none`: it does not.
+    None,
+    /// `shadow-depth`: thickness from shadow maps, light from T(s) (Jimenez et al. 2010; papers/004 ch. 5).
+    ShadowDepth,
+}
+
+impl fmt::Display for TransmitMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::ShadowDepth => "shadow-depth",
+        })
+    }
+}
+
+impl FromStr for TransmitMethod {
+    type Err = RenderError;
+
+    fn from_str(text: &str) -> Result<Self, RenderError> {
+        match text {
+            "none" => Ok(Self::None),
+            "shadow-depth" => Ok(Self::ShadowDepth),
+            _ => Err(RenderError::Limit {
+                what: "transmittance",
+                found: text.into(),
+                expected: "expected none or shadow-depth".into(),
+            }),
+        }
+    }
+}
+
+/// Entries of T(s): a step of 0.03 mm for skin.
+const TRANSMITTANCE_ENTRIES: usize = 256;
+/// Millimetres that a point is moved inwards before its depth is compared: 0.005 of a head (papers/004 listing 5.1).
+const SHRINK_MM: f32 = 1.2;
 
 /// A light as the shader reads it; the fields are described there.
 #[repr(C)]
@@ -60,6 +121,7 @@ pub(crate) struct Params {
     pub(crate) environment_levels: f32,
     pub(crate) has_maps: u32,
     pub(crate) wrinkle_map_count: u32,
+    pub(crate) transmit: [f32; 4],
     pub(crate) hair_color: [f32; 4],
     pub(crate) is_second_sample: u32,
     pub(crate) padding: [u32; 3],
@@ -109,6 +171,34 @@ pub(crate) struct Lighting<'a> {
     pub(crate) depth: &'a wgpu::TextureView,
     /// Ids and depth of the pixel's first sample, where this is not it: what looks the same there is not shaded again.
     pub(crate) first: Option<(&'a wgpu::TextureView, &'a wgpu::TextureView)>,
+    pub(crate) transmittance: Option<&'a Transmittance>,
+}
+
+/// T(s) of a profile as a texture of one row.
+pub(crate) struct Transmittance {
+    table: wgpu::TextureView,
+    thickness_max_mm: f32,
+}
+
+impl Transmittance {
+    /// Samples T(s) of a profile.
+    ///
+    /// # Errors
+    /// The profile has no finite width.
+    pub(crate) fn new(gpu: &Gpu, profile: &Profile) -> Result<Self, RenderError> {
+        let table = TransmittanceTable::new(profile, TRANSMITTANCE_ENTRIES, None)?;
+        let mut texels: Vec<_> =
+            table.values.iter().map(|t| [t[0] as f32, t[1] as f32, t[2] as f32, 1.0]).collect();
+        // What is thicker than the table lets nothing through.
+        if let Some(last) = texels.last_mut() {
+            *last = [0.0; 4];
+        }
+        let size = [texels.len() as u32, 1];
+        Ok(Self {
+            table: crate::texture::upload_half(gpu, "transmittance", size, &[vec![texels]]),
+            thickness_max_mm: table.thickness_max_mm as f32,
+        })
+    }
 }
 
 /// What it reads of one head.
@@ -124,6 +214,8 @@ pub(crate) struct Shaded<'a> {
 /// The pipeline of the pass.
 pub(crate) struct Shade {
     pipeline: wgpu::ComputePipeline,
+    /// Made by the first frame that lights points of the surface.
+    samples_pipeline: Option<wgpu::ComputePipeline>,
     trilinear_repeat: wgpu::Sampler,
     linear_clamp: wgpu::Sampler,
     compare: wgpu::Sampler,
@@ -142,6 +234,7 @@ impl Shade {
         let black = crate::texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]);
         Self {
             pipeline: gpu.compute_pipeline("shade", SHADER, "shade"),
+            samples_pipeline: None,
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
                 label: Some("trilinear repeat"),
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -170,25 +263,7 @@ impl Shade {
         outputs: [&wgpu::TextureView; 3],
     ) {
         let maps = shaded.head.maps.as_ref();
-        let params = Params {
-            // Maps hold true depths; interreflection between pores, which is not drawn, would deepen them to the eye.
-            slope_scale: 1.35,
-            wrinkle_strength: 1.25,
-            hemoglobin_scale: shaded.hemoglobin_scale,
-            head: shaded.index,
-            environment_intensity: lighting.environment_intensity,
-            environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
-            has_maps: u32::from(maps.is_some()),
-            wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
-            is_second_sample: u32::from(lighting.first.is_some()),
-            padding: [0; 3],
-            hair_color: maps.map_or([0.0; 4], |m| {
-                let [r, g, b] = m.hair_color_linear;
-                [r, g, b, 1.0]
-            }),
-            harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
-            lights: lighting.lights,
-        };
+        let params = params(lighting, shaded);
         let params = gpu.uniform("shade", &params);
         let texture = wgpu::BindingResource::TextureView;
         let environment = lighting.environment.map_or(&self.black, |e| &e.filtered);
@@ -208,6 +283,7 @@ impl Shade {
                 texture(lighting.depth),
                 texture(lighting.first.map_or(lighting.ids, |f| f.0)),
                 texture(lighting.first.map_or(lighting.depth, |f| f.1)),
+                texture(lighting.transmittance.map_or(&self.black, |t| &t.table)),
             ],
         );
         let head = gpu.bind(
@@ -236,5 +312,100 @@ impl Shade {
         pass.set_bind_group(2, &targets, &[]);
         let size = outputs[0].texture().size();
         pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+    }
+
+    /// Makes what [`Shade::record_samples`] needs.
+    pub(crate) fn prepare_samples(&mut self, gpu: &Gpu) {
+        self.samples_pipeline
+            .get_or_insert_with(|| gpu.compute_pipeline("light samples", SAMPLES_SHADER, "light_samples"));
+    }
+
+    /// Diffuse light at `count` points of a head's surface.
+    pub(crate) fn record_samples(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        lighting: &Lighting<'_>,
+        shaded: &Shaded<'_>,
+        [samples, light]: [&wgpu::Buffer; 2],
+        count: u32,
+    ) {
+        let Some(pipeline) = &self.samples_pipeline else { return };
+        let maps = shaded.head.maps.as_ref();
+        let params = gpu.uniform("light samples", &params(lighting, shaded));
+        let texture = wgpu::BindingResource::TextureView;
+        let sampler = wgpu::BindingResource::Sampler;
+        let bind = |group: u32, resources: Vec<(u32, wgpu::BindingResource<'_>)>| {
+            let entries: Vec<_> = resources
+                .into_iter()
+                .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+                .collect();
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("light samples"),
+                layout: &pipeline.get_bind_group_layout(group),
+                entries: &entries,
+            })
+        };
+        let frame = bind(
+            0,
+            vec![
+                (0, lighting.view.as_entire_binding()),
+                (1, params.as_entire_binding()),
+                (3, texture(lighting.shadows)),
+                (5, sampler(&self.trilinear_repeat)),
+                (6, sampler(&self.linear_clamp)),
+                (7, sampler(&self.compare)),
+            ],
+        );
+        let head = bind(
+            1,
+            vec![
+                (0, shaded.positions.as_entire_binding()),
+                (1, shaded.head.vertices.as_entire_binding()),
+                (2, shaded.head.triangles.as_entire_binding()),
+                (3, shaded.frames.as_entire_binding()),
+                (4, texture(maps.map_or(&self.black, |m| &m.skin))),
+                (5, texture(maps.map_or(&self.black, |m| &m.gloss))),
+                (6, texture(maps.map_or(&self.black, |m| &m.slopes))),
+                (7, texture(maps.map_or(&self.black_array, |m| &m.wrinkles))),
+                (8, texture(&shaded.blended.blood)),
+                (9, texture(&shaded.blended.wrinkles)),
+                (10, texture(&shaded.head.skin_color)),
+            ],
+        );
+        let data = bind(2, vec![(3, samples.as_entire_binding()), (4, light.as_entire_binding())]);
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &frame, &[]);
+        pass.set_bind_group(1, &head, &[]);
+        pass.set_bind_group(2, &data, &[]);
+        pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
+    }
+}
+
+/// Numbers of the pass for one head.
+fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
+    let maps = shaded.head.maps.as_ref();
+    Params {
+        // Maps hold true depths; interreflection between pores, which is not drawn, would deepen them to the eye.
+        slope_scale: 1.35,
+        wrinkle_strength: 1.25,
+        hemoglobin_scale: shaded.hemoglobin_scale,
+        head: shaded.index,
+        environment_intensity: lighting.environment_intensity,
+        environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
+        has_maps: u32::from(maps.is_some()),
+        wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
+        transmit: lighting
+            .transmittance
+            .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),
+        is_second_sample: u32::from(lighting.first.is_some()),
+        padding: [0; 3],
+        hair_color: maps.map_or([0.0; 4], |m| {
+            let [r, g, b] = m.hair_color_linear;
+            [r, g, b, 1.0]
+        }),
+        harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
+        lights: lighting.lights,
     }
 }

@@ -26,6 +26,9 @@ struct Params {
     // 1 where the head has maps.
     has_maps: u32,
     wrinkle_map_count: u32,
+    // x = 1 / thickness of the last entry of T(s), 1 / mm, or 0 for no transmittance; y = millimetres that positions are
+    // moved inwards.
+    transmit: vec4f,
     // rgb = albedo of hair drawn with the skin.
     hair_color: vec4f,
     // 1 where the pixel has a first sample whose light may do for this one.
@@ -49,6 +52,8 @@ struct Params {
 @group(0) @binding(8) var depth: texture_depth_2d;
 @group(0) @binding(9) var first_visible: texture_2d<u32>;
 @group(0) @binding(10) var first_depth: texture_depth_2d;
+// T(s): rgb over thickness.
+@group(0) @binding(11) var transmittance: texture_2d<f32>;
 
 @group(1) @binding(0) var<storage, read> positions: array<vec4f>;
 @group(1) @binding(1) var<storage, read> vertices: array<Vertex>;
@@ -131,6 +136,9 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < view.light_count; i++) {
         add_light(params.lights[i], surface, to_viewer, turn, &diffuse, &specular);
     }
+    if params.transmit.x > 0.0 && surface.scattering > 0.0 {
+        diffuse += transmitted(surface, turn);
+    }
 
     if surface.scattering > 0.0 {
         textureStore(diffuse_out, id.xy, vec4f(diffuse, surface.scattering));
@@ -184,14 +192,27 @@ fn surface_at(pixel: vec2f, corners: vec4u) -> Surface {
     let duv_dx = vec2f(dot(right, us), dot(right, vs)) - uv;
     let duv_dy = vec2f(dot(down, us), dot(down, vs)) - uv;
 
+    let position = here.x * a + here.y * b + here.z * c;
+    let back = select(1.0, -1.0, dot(cross(b - a, c - a), position) > 0.0);
+    return surface_of(corners, here, duv_dx, duv_dy, back);
+}
+
+// The surface at barycentric coordinates of a triangle, seen from its front (back = 1) or from behind (-1).
+fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f32) -> Surface {
+    let vertex = array<Vertex, 3>(vertices[corners.x], vertices[corners.y], vertices[corners.z]);
+    let a = positions[vertex[0].point].xyz;
+    let b = positions[vertex[1].point].xyz;
+    let c = positions[vertex[2].point].xyz;
+    let us = vec3f(vertex[0].u, vertex[1].u, vertex[2].u);
+    let vs = vec3f(vertex[0].v, vertex[1].v, vertex[2].v);
+    let uv = vec2f(dot(here, us), dot(here, vs));
     let f0 = frames[corners.x];
     let f1 = frames[corners.y];
     let f2 = frames[corners.z];
     var surface: Surface;
-    surface.position = view.origin.xyz + here.x * a + here.y * b + here.z * c;
+    surface.position = here.x * a + here.y * b + here.z * c;
     let to_viewer = normalize(view.origin.xyz - surface.position);
     let facet = cross(b - a, c - a);
-    let back = select(1.0, -1.0, dot(facet, to_viewer) < 0.0);
     surface.facet = back * normalize(facet);
     surface.smooth_normal = back * normalize(here.x * f0.normal + here.y * f1.normal + here.z * f2.normal);
     surface.occlusion = clamp(here.x * f0.occlusion + here.y * f1.occlusion + here.z * f2.occlusion, 0.0, 1.0);
@@ -292,6 +313,29 @@ fn highlight(cos_half: f32, roughness: f32, spread: f32) -> f32 {
 
 fn schlick(f0: f32, cosine: f32) -> f32 { return f0 + (1.0 - f0) * pow5(1.0 - clamp(cosine, 0.0, 1.0)); }
 
+// Irradiance of a surface that faces a light, as far as its place and cone go, and where the light is.
+struct Arriving {
+    irradiance: vec3f,
+    to_light: vec3f,
+    // Tangent of half the angle that the source fills.
+    spread: f32,
+}
+
+fn arriving(light: Light, position: vec3f) -> Arriving {
+    var result = Arriving(light.color.rgb, light.position.xyz, light.color.w);
+    if light.position.w > 0.0 {
+        let way = light.position.xyz - position;
+        let distance_squared = max(dot(way, way), 1e-4);
+        result.to_light = normalize(way);
+        result.irradiance /= distance_squared;
+        result.spread *= inverseSqrt(distance_squared);
+        if light.spot.w > -1.5 {
+            result.irradiance *= smoothstep(light.spot.w, light.shape.x, -dot(result.to_light, light.spot.xyz));
+        }
+    }
+    return result;
+}
+
 fn add_light(
     light: Light,
     surface: Surface,
@@ -300,25 +344,13 @@ fn add_light(
     diffuse: ptr<function, vec3f>,
     specular: ptr<function, vec3f>,
 ) {
-    var to_light = light.position.xyz;
-    var falloff = 1.0;
-    var spread = light.color.w;
-    if light.position.w > 0.0 {
-        to_light -= surface.position;
-        let distance_squared = max(dot(to_light, to_light), 1e-4);
-        falloff = 1.0 / distance_squared;
-        spread *= inverseSqrt(distance_squared);
-        to_light = normalize(to_light);
-        if light.spot.w > -1.5 {
-            let cone = smoothstep(light.spot.w, light.shape.x, -dot(to_light, light.spot.xyz));
-            falloff *= cone;
-        }
-    }
+    let lit = arriving(light, surface.position);
+    let to_light = lit.to_light;
     let facing = dot(surface.smooth_normal, to_light);
-    if falloff <= 0.0 || facing <= -0.2 {
+    var irradiance = lit.irradiance;
+    if all(irradiance <= vec3f(0.0)) || facing <= -0.2 {
         return;
     }
-    var irradiance = falloff * light.color.rgb;
     if light.shape.y >= 0.0 {
         irradiance *= shadow(light, surface, to_light, turn);
     }
@@ -332,7 +364,7 @@ fn add_light(
     if cos_light > 0.0 {
         let half_vector = to_light + to_viewer;
         let h = normalize(half_vector);
-        let brdf = highlight(dot(surface.normal, h), surface.roughness, spread) * schlick(surface.f0, dot(h, to_viewer))
+        let brdf = highlight(dot(surface.normal, h), surface.roughness, lit.spread) * schlick(surface.f0, dot(h, to_viewer))
             / max(dot(half_vector, half_vector), 0.05);
         *specular += irradiance * surface.specular * brdf * cos_light;
     }
@@ -395,6 +427,71 @@ fn shadow(light: Light, surface: Surface, to_light: vec3f, turn: f32) -> f32 {
         lit += textureSampleCompareLevel(shadows, compare, at, layer, reference);
     }
     return lit / f32(FILTER_SAMPLES);
+}
+
+// ---- Transmittance ----
+
+const THICKNESS_SAMPLES = 6u;
+// Radius over which thickness is averaged, metres: what light forgets on its way through a millimetre or two.
+const THICKNESS_RADIUS = 0.001;
+// Transmitted light starts this much before the terminator (papers/004 eq. 5.13).
+const WRAP = 0.3;
+
+fn transmittance_at(thickness_mm: f32) -> vec3f {
+    let entries = f32(textureDimensions(transmittance).x);
+    let x = clamp(thickness_mm * params.transmit.x, 0.0, 1.0) * (entries - 1.0) + 0.5;
+    return textureSampleLevel(transmittance, linear_clamp, vec2f(x / entries, 0.5), 0.0).rgb;
+}
+
+// Light that comes through from behind: papers/004 eqs. 5.11 and 5.13, with the irradiance of the back from the reversed
+// vertex normal. Diffuse radiance of a white surface.
+fn transmitted(surface: Surface, turn: f32) -> vec3f {
+    var sum = vec3f(0.0);
+    var thinnest_mm = 1e6;
+    for (var i = 0u; i < view.light_count; i++) {
+        let light = params.lights[i];
+        let lit = arriving(light, surface.position);
+        let through = -dot(surface.smooth_normal, lit.to_light);
+        if light.shape.y < 0.0 || through <= -WRAP || all(lit.irradiance <= vec3f(0.0)) {
+            continue;
+        }
+        // Inside of the surface every ray of the shadow map meets the head (section 5.5).
+        let p = surface.position - 1e-3 * params.transmit.y * surface.smooth_normal;
+        let clip = light.clip_from_world * vec4f(p, 1.0);
+        let ndc = clip.xyz / clip.w;
+        if any(abs(ndc.xy) > vec2f(1.0)) || clip.w <= 0.0 {
+            continue;
+        }
+        let receiver = shadow_metres(light, ndc.z);
+        var across = light.shadow.x;
+        if light.position.w > 0.0 {
+            across *= receiver;
+        }
+        let center = ndc.xy * vec2f(0.5, -0.5) + 0.5;
+        let resolution = f32(textureDimensions(shadows).x);
+        var passed = vec3f(0.0);
+        var thickest_mm = 0.0;
+        for (var tap = 0u; tap < THICKNESS_SAMPLES; tap++) {
+            let at = center + THICKNESS_RADIUS / across * vogel_disk(tap, THICKNESS_SAMPLES, turn);
+            let texel = vec2i(clamp(at, vec2f(0.0), vec2f(0.9999)) * resolution);
+            let entry = shadow_metres(light, textureLoad(shadows, texel, i32(light.shape.y), 0));
+            // Negative where the ray passes beside the surface, as it does along the terminator: nothing comes through.
+            let thickness_mm = 1e3 * (receiver - entry) + params.transmit.y * max(through, 0.0);
+            passed += select(vec3f(0.0), transmittance_at(thickness_mm), thickness_mm > 0.0);
+            thickest_mm = max(thickest_mm, thickness_mm);
+        }
+        passed /= f32(THICKNESS_SAMPLES);
+        sum += lit.irradiance * max(WRAP + through, 0.0) * passed / PI;
+        if through > 0.0 && thickest_mm > params.transmit.y * through {
+            thinnest_mm = min(thinnest_mm, thickest_mm);
+        }
+    }
+    if view.has_environment == 1u {
+        // The environment has no shadow map: a lamp behind the surface knows how thick it is.
+        sum += params.environment_intensity * surface.occlusion * harmonic_irradiance(-surface.smooth_normal)
+            * transmittance_at(thinnest_mm);
+    }
+    return sum;
 }
 
 // Distance from the light along its axis, metres, of a depth of the shadow map.

@@ -1,0 +1,361 @@
+//! `reference-surface:N`: the integral of the profile over the deformed surface.
+//!
+//! ```text
+//! positions --CPU: stratified by area, sorted into a grid--> samples --light_samples--> light of each
+//!        irradiance, depth, samples, light --gather, a batch at a time--> sums, squares --finish--> scattered
+//! ```
+//!
+//! Theory: radiant exitance is the integral of R(|x - y|) E(y) over the surface (Jensen et al. 2001 with a diffusion
+//! profile; papers/004 eq. 5.1 without the plane). E has the frame's own lights, shadows and maps; light that comes from
+//! behind, across gaps or around edges is in it, so frames with this method use no transmittance.
+//!
+//! Inside of a millimetre the surface counts as flat: there the integral is the light of a disk times E(x), plus the
+//! sampled difference of E (a control variate; without it the steep centre of R would be nearly all noise).
+//!
+//! The error falls at least as 1 / sqrt(N); the spread of the batches gives an estimate of it.
+//!
+//! Does not: see skin outside of the picture's frame by more than the kernel, average light over a pixel.
+
+use glam::{Mat4, Vec3};
+use rubor_rig::head::Material;
+use rubor_rig::skin::profile::Profile;
+
+use crate::error::RenderError;
+use crate::gpu::{Gpu, PassTimer};
+
+/// Samples of a batch.
+pub(crate) const BATCH: usize = 65_536;
+/// Entries of the table of R.
+const ENTRIES: usize = 4096;
+/// Share of the widest channel's light inside of the kernel.
+const COVERAGE: f64 = 0.9999;
+/// Radius inside of which the surface counts as flat, mm; ears and lids are thicker.
+const NEAR_MM: f64 = 1.0;
+/// Cells of the grid in the radius of the kernel.
+const CELLS_PER_RADIUS: f32 = 2.0;
+/// Most cells of a grid; larger ones grow their cells.
+const MOST_CELLS: f32 = 4e6;
+
+/// WGSL of the passes.
+pub(crate) const SHADER: &str =
+    concat!(include_str!("../../../shared/view.wgsl"), include_str!("surface.wgsl"));
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Params {
+    pub(crate) origin: [f32; 3],
+    pub(crate) head: u32,
+    pub(crate) cells: [u32; 3],
+    pub(crate) cell_mm: f32,
+    pub(crate) half_width_mm: f32,
+    pub(crate) near_mm: f32,
+    pub(crate) sample_mm2: f32,
+    pub(crate) batches: f32,
+    pub(crate) near_light: [f32; 4],
+}
+
+/// A sample as the shaders read it.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct SurfaceSample {
+    pub(crate) place: [f32; 4],
+    pub(crate) barycentric: [f32; 4],
+}
+
+/// Skin triangles of a head that the picture can need.
+pub(crate) struct Skin {
+    /// Index in the head's list, and corners in world space, metres.
+    triangles: Vec<(u32, [Vec3; 3])>,
+    /// Sums of areas up to and with each triangle, mm^2.
+    area_mm2: Vec<f64>,
+    origin: Vec3,
+    size: Vec3,
+}
+
+/// A batch of samples, sorted by cell.
+pub(crate) struct Batch {
+    pub(crate) samples: Vec<SurfaceSample>,
+    pub(crate) starts: Vec<u32>,
+}
+
+/// The grid of a head.
+#[derive(Clone, Copy)]
+struct Grid {
+    cells: [u32; 3],
+    cell_mm: f32,
+}
+
+impl Skin {
+    /// Chooses triangles (three vertices and a material each) that are in the picture or up to `margin` of its size
+    /// outside.
+    pub(crate) fn new(
+        triangles: &[[u32; 4]],
+        point_of_vertex: &[u32],
+        points: &[Vec3],
+        clip_from_world: &Mat4,
+        margin: f32,
+    ) -> Self {
+        let skin = Material::ALL.iter().position(|m| *m == Material::Skin).unwrap_or(0) as u32;
+        let in_picture = |p: &Vec3| {
+            let c = *clip_from_world * p.extend(1.0);
+            c.w <= 0.0 || (c.x.abs() <= margin * c.w && c.y.abs() <= margin * c.w)
+        };
+        let mut chosen = Vec::new();
+        let (mut area_mm2, mut sum) = (Vec::new(), 0.0);
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for (i, t) in triangles.iter().enumerate().filter(|(_, t)| t[3] == skin) {
+            let corners = [t[0], t[1], t[2]].map(|v| points[point_of_vertex[v as usize] as usize]);
+            if !corners.iter().any(in_picture) {
+                continue;
+            }
+            let cross = (corners[1] - corners[0]).as_dvec3().cross((corners[2] - corners[0]).as_dvec3());
+            sum += 0.5e6 * cross.length();
+            chosen.push((i as u32, corners));
+            area_mm2.push(sum);
+            for c in corners {
+                (low, high) = (low.min(c), high.max(c));
+            }
+        }
+        Self { triangles: chosen, area_mm2, origin: low, size: high - low }
+    }
+
+    /// Area, mm^2.
+    fn total_mm2(&self) -> f64 {
+        self.area_mm2.last().copied().unwrap_or(0.0)
+    }
+
+    fn grid(&self, half_width_mm: f32) -> Grid {
+        let mut cell_mm = half_width_mm / CELLS_PER_RADIUS;
+        let most = (1e3 * self.size + cell_mm) / cell_mm;
+        cell_mm *= (most.x * most.y * most.z / MOST_CELLS).cbrt().max(1.0);
+        let cells = (1e3 * self.size / cell_mm).floor().as_uvec3() + 1;
+        Grid { cells: cells.to_array(), cell_mm }
+    }
+
+    /// Samples of batch number `batch`: evenly along the sum of areas, so that each triangle has its share to within
+    /// one sample, at random places of the triangle.
+    fn batch(&self, batch: u32, count: usize, grid: &Grid) -> Batch {
+        let mut random = Random(0x9E37_79B9_7F4A_7C15 ^ (u64::from(batch) << 32));
+        let step = self.total_mm2() / count as f64;
+        let shift = random.next();
+        let mut triangle = 0;
+        let mut cells = Vec::with_capacity(count);
+        let mut unsorted = Vec::with_capacity(count);
+        for i in 0..count {
+            let at = (i as f64 + shift) * step;
+            while triangle + 1 < self.triangles.len() && self.area_mm2[triangle] < at {
+                triangle += 1;
+            }
+            let (index, corners) = self.triangles[triangle];
+            // Uniform over the triangle: the square folded along its diagonal.
+            let (mut u, mut v) = (random.next() as f32, random.next() as f32);
+            if u + v > 1.0 {
+                (u, v) = (1.0 - u, 1.0 - v);
+            }
+            let world = corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
+            let mm = 1e3 * (world - self.origin);
+            let cell: [u32; 3] =
+                std::array::from_fn(|a| ((mm[a] / grid.cell_mm).max(0.0) as u32).min(grid.cells[a] - 1));
+            cells.push((cell[2] * grid.cells[1] + cell[1]) * grid.cells[0] + cell[0]);
+            unsorted.push(SurfaceSample {
+                place: [mm.x, mm.y, mm.z, f32::from_bits(index)],
+                barycentric: [u, v, 0.0, 0.0],
+            });
+        }
+        let cell_count = grid.cells.iter().product::<u32>() as usize;
+        let mut starts = vec![0u32; cell_count + 1];
+        for c in &cells {
+            starts[*c as usize + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut samples: Vec<SurfaceSample> = vec![bytemuck::Zeroable::zeroed(); count];
+        for (c, s) in cells.iter().zip(&unsorted) {
+            samples[next[*c as usize] as usize] = *s;
+            next[*c as usize] += 1;
+        }
+        Batch { samples, starts }
+    }
+}
+
+/// splitmix64: 0 to 1.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// Images of the frame.
+pub(crate) struct Inputs<'a> {
+    pub(crate) view: &'a wgpu::Buffer,
+    pub(crate) ids: &'a wgpu::TextureView,
+    pub(crate) irradiance: &'a wgpu::TextureView,
+    pub(crate) depth: &'a wgpu::TextureView,
+    pub(crate) scattered: &'a wgpu::TextureView,
+}
+
+/// The passes and sums of one frame.
+pub(crate) struct Surface {
+    gather: wgpu::ComputePipeline,
+    finish: wgpu::ComputePipeline,
+    profile: wgpu::Buffer,
+    half_width_mm: f64,
+    near_light: [f32; 4],
+    sums: wgpu::Buffer,
+    squares: wgpu::Buffer,
+    size: [u32; 2],
+}
+
+impl Surface {
+    pub(crate) fn new(gpu: &Gpu, profile: &Profile, size: [u32; 2]) -> Self {
+        let half_width_mm = profile.channels.iter().map(|c| c.sample_radius(COVERAGE)).fold(0.0, f64::max);
+        let near_mm = NEAR_MM.min(half_width_mm);
+        let total = profile.total();
+        let table: Vec<[f32; 4]> = (0..ENTRIES)
+            .map(|i| {
+                // Half an entry instead of 0, where R may be infinite.
+                let x = (i as f64).max(0.5) / (ENTRIES - 1) as f64;
+                let r = profile.reflectance(half_width_mm * x * x);
+                let [r, g, b] = [0, 1, 2].map(|c| (r[c] / total[c]) as f32);
+                [r, g, b, 0.0]
+            })
+            .collect();
+        let near = profile.cdf(near_mm).map(|l| l as f32);
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        Self {
+            gather: gpu.compute_pipeline("reference-surface", SHADER, "gather"),
+            finish: gpu.compute_pipeline("reference-surface", SHADER, "finish"),
+            profile: gpu.storage("profile", &table),
+            half_width_mm,
+            near_light: [near[0], near[1], near[2], 0.0],
+            sums: gpu.storage_zeroed("sums", 16 * pixels),
+            squares: gpu.storage_zeroed("squares", 16 * pixels),
+            size,
+        }
+    }
+
+    /// Adds batches of one head. `light` records the pass that finds the light of samples.
+    pub(crate) fn add_head(
+        &self,
+        gpu: &Gpu,
+        inputs: &Inputs<'_>,
+        head: u32,
+        skin: &Skin,
+        batches: u32,
+        light: &mut dyn FnMut(&mut wgpu::CommandEncoder, &wgpu::Buffer, &wgpu::Buffer),
+    ) -> Result<(), RenderError> {
+        if skin.total_mm2() <= 0.0 {
+            return Ok(());
+        }
+        let grid = skin.grid(self.half_width_mm as f32);
+        let texture = wgpu::BindingResource::TextureView;
+        for batch in 0..batches {
+            let Batch { samples, starts } = skin.batch(batch, BATCH, &grid);
+            let params = Params {
+                origin: skin.origin.to_array(),
+                head,
+                cells: grid.cells,
+                cell_mm: grid.cell_mm,
+                half_width_mm: self.half_width_mm as f32,
+                near_mm: NEAR_MM.min(self.half_width_mm) as f32,
+                sample_mm2: (skin.total_mm2() / BATCH as f64) as f32,
+                batches: batch as f32,
+                near_light: self.near_light,
+            };
+            let params = gpu.uniform("reference-surface", &params);
+            let samples = gpu.storage("surface samples", &samples);
+            let lit = gpu.storage_zeroed("sample light", 16 * BATCH as u64);
+            let starts = gpu.storage("cell starts", &starts);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            light(&mut encoder, &samples, &lit);
+            let group = gpu.bind(
+                "reference-surface",
+                &self.gather,
+                0,
+                &[
+                    inputs.view.as_entire_binding(),
+                    params.as_entire_binding(),
+                    texture(inputs.ids),
+                    texture(inputs.irradiance),
+                    texture(inputs.depth),
+                    self.profile.as_entire_binding(),
+                    starts.as_entire_binding(),
+                    samples.as_entire_binding(),
+                    lit.as_entire_binding(),
+                    self.sums.as_entire_binding(),
+                    self.squares.as_entire_binding(),
+                ],
+            );
+            {
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+                pass.set_pipeline(&self.gather);
+                pass.set_bind_group(0, &group, &[]);
+                pass.dispatch_workgroups(self.size[0].div_ceil(8), self.size[1].div_ceil(8), 1);
+            }
+            gpu.queue.submit([encoder.finish()]);
+            // One batch at a time in memory.
+            gpu.device
+                .poll(wgpu::PollType::wait_indefinitely())
+                .map_err(|e| RenderError::Lost(e.to_string()))?;
+        }
+        Ok(())
+    }
+
+    /// Writes the mean where `scattered` is; unscattered pixels keep their light.
+    pub(crate) fn record_finish(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        timer: &mut PassTimer,
+        inputs: &Inputs<'_>,
+    ) {
+        let texture = wgpu::BindingResource::TextureView;
+        let entries = [
+            (0, inputs.view.as_entire_binding()),
+            (3, texture(inputs.irradiance)),
+            (9, self.sums.as_entire_binding()),
+            (11, texture(inputs.scattered)),
+        ]
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("reference-surface"),
+            layout: &self.finish.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let mut pass = timer.compute(encoder, "reference-surface");
+        pass.set_pipeline(&self.finish);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(self.size[0].div_ceil(8), self.size[1].div_ceil(8), 1);
+    }
+
+    /// Root mean square standard error of the mean over that of the result, all channels of all scattering pixels;
+    /// nothing from fewer than two batches.
+    pub(crate) fn relative_noise(&self, gpu: &Gpu) -> Result<Option<f64>, RenderError> {
+        let read = |b: &wgpu::Buffer| -> Result<Vec<[f32; 4]>, RenderError> {
+            Ok(bytemuck::pod_collect_to_vec(&gpu.read_buffer(b)?))
+        };
+        let (sums, squares) = (read(&self.sums)?, read(&self.squares)?);
+        let (mut error, mut signal) = (0.0, 0.0);
+        for (s, q) in sums.iter().zip(&squares) {
+            let n = f64::from(s[3]);
+            if n < 2.0 {
+                continue;
+            }
+            for c in 0..3 {
+                let mean = f64::from(s[c]) / n;
+                let variance = (f64::from(q[c]) / n - mean * mean).max(0.0) / (n - 1.0);
+                error += variance;
+                signal += mean * mean;
+            }
+        }
+        Ok((signal > 0.0).then(|| (error / signal).sqrt()))
+    }
+}
