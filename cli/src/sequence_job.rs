@@ -49,11 +49,14 @@ pub(crate) struct Arguments {
     #[arg(long, default_value = "ssaa:2", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
     /// Factor of the light before the tone map
-    #[arg(long, default_value_t = 2.4)]
+    #[arg(long, default_value_t = 1.8)]
     pub(crate) exposure: f32,
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
     #[arg(long, value_name = "NAME")]
     pub(crate) adapter: Option<String>,
+    /// Draw only these frames, such as 1,12-20 (the first is 1); makes no video
+    #[arg(long, value_parser = parse_frames, value_name = "LIST")]
+    pub(crate) frames: Option<FrameList>,
     /// Keep the frames that a stopped run of the same job left
     #[arg(long)]
     pub(crate) resume: bool,
@@ -80,6 +83,25 @@ pub(crate) enum Scatter {
 pub(crate) enum Antialias {
     None,
     Supersampling(u32),
+}
+
+/// Numbers of frames from 1, ascending, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct FrameList(Vec<u32>);
+
+fn parse_frames(text: &str) -> Result<FrameList, String> {
+    let wrong = || format!("found {text:?}, expected frame numbers from 1 such as 1,12-20");
+    let mut numbers = std::collections::BTreeSet::new();
+    for part in text.split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let first: u32 = first.trim().parse().map_err(|_| wrong())?;
+        let last: u32 = last.trim().parse().map_err(|_| wrong())?;
+        if first == 0 || last < first || last - first > 1_000_000 {
+            return Err(wrong());
+        }
+        numbers.extend(first..=last);
+    }
+    Ok(FrameList(numbers.into_iter().collect()))
 }
 
 fn parse_scatter(text: &str) -> Result<Scatter, String> {
@@ -136,7 +158,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         evaluators.push(evaluator);
     }
     let Some(first) = evaluators.first() else { return Err(Failure::input("there is no head to draw")) };
-    let frames = first.frame_count();
+    let frames = chosen_frames(first.frame_count(), arguments.frames.as_ref())?;
     let renderer = Renderer::new(Gpu::new(arguments.adapter.as_deref())?)?;
 
     output::folder(&arguments.output)?;
@@ -146,12 +168,12 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     let mut studio = Studio::new(renderer, &heads)?;
 
     let mut sheet = Vec::new();
-    let on_sheet = contact_sheet::choose(frames);
+    let on_sheet = contact_sheet::choose(frames.len() as u32);
     let mut times = PassTimes::default();
     let mut first_frame_s = None;
     let mut drawn = Vec::new();
-    let mut progress = Progress::new("frames", u64::from(frames));
-    for frame in 0..frames {
+    let mut progress = Progress::new("frames", frames.len() as u64);
+    for (place, frame) in frames.iter().copied().enumerate() {
         let path = frame_path(&arguments.output, frame);
         let kept = if is_new { None } else { read_frame(&path, size) };
         let picture = match kept {
@@ -169,7 +191,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
                 picture
             }
         };
-        if on_sheet.contains(&frame) {
+        if on_sheet.contains(&(place as u32)) {
             sheet.push(contact_sheet::reduce(&picture));
         }
         progress.step();
@@ -177,7 +199,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     progress.finish();
 
     write_png(&arguments.output.join(SHEET_FILE), &contact_sheet::page(&sheet))?;
-    if !arguments.no_video {
+    if !arguments.no_video && arguments.frames.is_none() {
         let path = arguments.output.join(VIDEO_FILE);
         if let Video::NoEncoder = video::encode(&arguments.output, 1, job.sequence.fps, &path)? {
             eprintln!("note: no video: the program ffmpeg is not on this machine (Debian, Ubuntu: ffmpeg)");
@@ -190,7 +212,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     let stats = json!({
         "adapter": { "name": gpu.name, "backend": format!("{:?}", gpu.backend), "driver": gpu.driver_info },
         "size": size,
-        "frames": frames,
+        "frames": frames.len(),
         "framesDrawn": drawn.len(),
         "scatter": format!("{:?}", arguments.scatter),
         "antialias": format!("{:?}", arguments.antialias),
@@ -205,9 +227,20 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     if arguments.json {
         println!("{text}");
     } else {
-        println!("{frames} frames in {}", arguments.output.display());
+        println!("{} frames in {}", frames.len(), arguments.output.display());
     }
     Ok(())
+}
+
+/// Indices from 0 of the frames to draw.
+fn chosen_frames(count: u32, list: Option<&FrameList>) -> Outcome<Vec<u32>> {
+    let Some(FrameList(numbers)) = list else { return Ok((0..count).collect()) };
+    match numbers.last() {
+        Some(last) if *last > count => Err(Failure::input(format!(
+            "--frames: found {last}, expected at most {count}, the length of the sequence"
+        ))),
+        _ => Ok(numbers.iter().map(|n| n - 1).collect()),
+    }
 }
 
 fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
@@ -375,5 +408,9 @@ mod tests {
         }
         assert_eq!(parse_antialias("ssaa:4"), Ok(Antialias::Supersampling(4)));
         assert!(parse_antialias("ssaa:0").is_err());
+        assert_eq!(parse_frames("3, 1-2,2"), Ok(FrameList(vec![1, 2, 3])));
+        for wrong in ["", "0", "4-3", "a", "1,,2"] {
+            assert!(parse_frames(wrong).unwrap_err().contains(wrong));
+        }
     }
 }

@@ -33,4 +33,5 @@ pub use gpu::{AdapterDescription, Gpu, PassTimer, list_adapters};
 pub use head::{
     ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
 };
+pub use passes::antialias;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

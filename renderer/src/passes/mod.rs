@@ -1,5 +1,6 @@
 //! One folder a pass: `mod.rs` with its theory, parameters and recording, its kernels, its tests.
 
+pub mod antialias;
 pub(crate) mod appearance;
 pub(crate) mod compose;
 pub(crate) mod display;
