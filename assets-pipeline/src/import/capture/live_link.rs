@@ -147,9 +147,9 @@ fn columns(names: &[&str], recording: &mut Recording) -> Vec<Column> {
         });
         seen.push(lower);
     }
-    let missing: Vec<&str> = (rubor_rig::names::ARKIT.into_iter())
-        .filter(|known| !recording.channels.iter().any(|c| canonical(&c.name) == Some(known)))
-        .collect();
+    let present: Vec<_> = recording.channels.iter().filter_map(|c| canonical(&c.name)).collect();
+    let missing: Vec<&str> =
+        rubor_rig::names::ARKIT.into_iter().filter(|known| !present.contains(known)).collect();
     if !missing.is_empty() && missing.len() < rubor_rig::names::ARKIT.len() {
         recording.notes.push(format!("no column for {}; they stay at rest", missing.join(", ")));
     }
@@ -221,14 +221,14 @@ fn split_angles(recording: &mut Recording) {
         let [yaw, pitch, roll] = angles.map(|a| a.unwrap_or_else(zeros));
         recording.head = Some(HeadAngles { yaw, pitch, roll });
     }
+    let present: Vec<_> = recording.channels.iter().filter_map(|c| canonical(&c.name)).collect();
     for (side, yaw, pitch) in eyes {
         let to_left = if side == "Left" { ["Out", "In"] } else { ["In", "Out"] };
         for (angle, [negative, positive]) in [(yaw, to_left), (pitch, ["Up", "Down"])] {
             let Some(angle) = angle else { continue };
             for (direction, sign) in [(negative, -1.0), (positive, 1.0)] {
                 let name = format!("eyeLook{direction}{side}");
-                let known = |c: &Channel| canonical(&c.name) == Some(name.as_str());
-                if !recording.channels.iter().any(known) {
+                if !present.contains(&name.as_str()) {
                     let values = angle.iter().map(|a| (sign * a * LOOK_PER_RADIAN).max(0.0)).collect();
                     recording.channels.push(Channel { name, values });
                 }
