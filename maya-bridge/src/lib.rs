@@ -27,6 +27,7 @@ mod appearance;
 mod ascii;
 pub mod error;
 pub mod read;
+pub mod write;
 
 /// The shader of skin colour, as it stands in `osl/`.
 pub const SKIN_OSL: &str = include_str!("../osl/rubor_skin.osl");

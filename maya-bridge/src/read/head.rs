@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use rubor_assets::import::materials::guess_material;
 use rubor_rig::expression::Inbetween;
-use rubor_rig::head::{BlendShape, Head, Material, Mesh, Part, Vertex};
+use rubor_rig::head::{BlendShape, Head, Material, Part, Vertex};
 
 use super::Options;
 use super::geometry::{Polygons, history, points, polygons, world_matrix};
