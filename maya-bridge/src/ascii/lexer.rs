@@ -75,6 +75,12 @@ impl<'a> Lexer<'a> {
         Ok(())
     }
 
+    /// True if the statement has no further argument.
+    pub(crate) fn at_end(&mut self) -> Result<bool, Fault> {
+        self.skip_space()?;
+        Ok(matches!(self.bytes.get(self.at), None | Some(b';')))
+    }
+
     /// Goes behind the next `;`.
     pub(crate) fn skip_statement(&mut self) -> Result<(), Fault> {
         while let Some(token) = self.next()? {

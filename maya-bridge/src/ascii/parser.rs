@@ -294,9 +294,9 @@ impl<'a> Parser<'a> {
 
     fn current_unit(&mut self) -> Result<(), Fault> {
         while let Some(token) = self.lexer.argument()? {
-            let line = self.lexer.line();
             let Token::Word(flag) = token else { continue };
             let Some(value) = self.text_argument()? else { break };
+            let line = self.lexer.line();
             let wrong = |expected: &str| Fault::new(line, format!("the unit {value:?}"), expected);
             match flag {
                 b"-l" | b"-linear" => {
@@ -413,6 +413,10 @@ impl<'a> Parser<'a> {
 
     fn fill(&mut self, data: &mut Data, attribute: &Attribute<'_>, line: usize) -> Result<(), Fault> {
         self.lexer.skip_type()?;
+        if self.lexer.at_end()? {
+            // `setAttr -l on ".tx";` and `setAttr -s 8 ".vt";` set no value.
+            return Ok(());
+        }
         match data {
             Data::Transform(transform) => self.fill_transform(transform, &attribute.key()),
             Data::Mesh(mesh) => self.fill_mesh(mesh, attribute, line),

@@ -283,7 +283,8 @@ mod tests {
             *y = [(0, 0.0), (1, 0.0)].into();
         }
         let c = Curve::new(&data, 24.0, 1.0).unwrap();
-        assert!((c.at(0.5) - 0.5).abs() < 1e-9);
+        // In the middle the curve is vertical: time fixes the parameter only to the cube root of its last bit.
+        assert!((c.at(0.5) - 0.5).abs() < 1e-4);
         // Parametric: t = 3u(1-u)^2 + u^3 at u = 0.25 is 0.4375, value there 3u^2(1-u) + u^3 = 0.15625.
         assert!((c.at(0.4375) - 0.15625).abs() < 1e-9, "{}", c.at(0.4375));
         // Handles at thirds are the unweighted curve.
@@ -296,7 +297,7 @@ mod tests {
 
     #[test]
     fn tracks_follow_the_curve_at_every_frame() {
-        let keys = [[0.0, 0.0], [7.0, 1.0], [20.0, 0.2], [21.0, 0.2], [40.0, 0.9]];
+        let keys = [[0.0, 0.0], [7.0, 0.3], [20.0, 1.0], [21.0, 1.0], [40.0, 0.2]];
         for tangent in [LINEAR, FLAT, STEP, SPLINE, CLAMPED, PLATEAU, STEP_NEXT, AUTO] {
             let c = curve(&keys, tangent);
             let (track, baked) = c.track(0.0, 24.0, |v| v as f32);

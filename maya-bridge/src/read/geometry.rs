@@ -123,6 +123,10 @@ fn of_mesh(mesh: &MeshData, path: &str, line: usize) -> Result<Polygons, Fault> 
         .unwrap_or_default();
     let uvs = mesh.uv_sets.get(&set).map(|s| s.uvs.clone()).unwrap_or_default();
     let corner_uvs = mesh.corner_uvs.get(&set);
+    if let Some(e) = mesh.edges.iter().position(|ends| ends.iter().any(|p| *p as usize >= points.len())) {
+        let found = format!("{path}, edge {e}: point {}", mesh.edges[e][0].max(mesh.edges[e][1]));
+        return Err(Fault::new(line, found, format!("a point below {}", points.len())));
+    }
     let mut faces = Vec::with_capacity(mesh.face_ends.len());
     let mut start = 0;
     for (f, end) in mesh.face_ends.iter().enumerate() {
@@ -137,9 +141,6 @@ fn of_mesh(mesh: &MeshData, path: &str, line: usize) -> Result<Polygons, Fault> 
                 return Err(fail(format!("edge {edge}"), format!("an edge below {}", mesh.edges.len())));
             };
             let point = ends[side];
-            if point as usize >= points.len() {
-                return Err(fail(format!("point {point}"), format!("a point below {}", points.len())));
-            }
             let uv = corner_uvs.and_then(|c| c.get(corner)).copied().unwrap_or(u32::MAX);
             if uv != u32::MAX && uv as usize >= uvs.len() {
                 let expected = format!("a texture coordinate below {}", uvs.len());
