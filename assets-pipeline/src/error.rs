@@ -28,6 +28,9 @@ pub enum ImportError {
     /// The imported head breaks a rule of [`rubor_rig::head::Head::validate`].
     #[error(transparent)]
     Head(#[from] rubor_rig::error::HeadError),
+    /// A file that belongs to the import and that people write is wrong at one place.
+    #[error(transparent)]
+    Text(#[from] rubor_rig::error::RigError),
 }
 
 impl ImportError {

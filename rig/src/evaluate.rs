@@ -135,6 +135,10 @@ impl Evaluator {
             }
         }
         notes.append(&mut binder.notes);
+        if let Some(capture) = &sequence.capture {
+            let message = format!("the recording {:?} was not loaded: it has no effect", capture.file);
+            notes.push(Note { place: source.place_of_key(&steps!["capture"]), message, nearest: None });
+        }
         let tracks = [
             ("expressions", &sequence.expressions),
             ("states", &sequence.states),

@@ -80,6 +80,85 @@ pub const ICT_EXTRA: [&str; 8] = [
     "pupilDilateRight",
 ];
 
+/// Action units of the Facial Action Coding System (P. Ekman, W. V. Friesen and J. C. Hager 2002) that a shape shows,
+/// the main one first; `L` and `R` mark the side where the shape has one. Empty for shapes that FACS has no unit for
+/// and for unknown names. FACS codes gaze as 61 to 64 and the jaw as action descriptors (AD).
+///
+/// The match is one of appearance: no ARKit shape was defined by a unit. A shape that mixes units lists all of them.
+///
+/// ```
+/// use rubor_rig::names::action_units;
+/// assert_eq!(action_units("mouthSmile_L"), ["AU12L"]);
+/// assert_eq!(action_units("browInnerUp"), ["AU1"]);
+/// assert!(action_units("pupilDilateLeft").is_empty());
+/// ```
+pub fn action_units(shape: &str) -> &'static [&'static str] {
+    let Some(name) = canonical(shape) else { return &[] };
+    ACTION_UNITS.iter().find(|(known, _)| *known == name).map_or(&[], |(_, units)| units)
+}
+
+const ACTION_UNITS: [(&str, &[&str]); 58] = [
+    ("browDownLeft", &["AU4L"]),
+    ("browDownRight", &["AU4R"]),
+    ("browInnerUp", &["AU1"]),
+    ("browInnerUpLeft", &["AU1L"]),
+    ("browInnerUpRight", &["AU1R"]),
+    ("browOuterUpLeft", &["AU2L"]),
+    ("browOuterUpRight", &["AU2R"]),
+    ("cheekPuff", &["AD34"]),
+    ("cheekPuffLeft", &["AD34L"]),
+    ("cheekPuffRight", &["AD34R"]),
+    ("cheekRaiserLeft", &["AU6L"]),
+    ("cheekRaiserRight", &["AU6R"]),
+    ("cheekSquintLeft", &["AU6L"]),
+    ("cheekSquintRight", &["AU6R"]),
+    ("eyeBlinkLeft", &["AU45L", "AU43L"]),
+    ("eyeBlinkRight", &["AU45R", "AU43R"]),
+    ("eyeLookDownLeft", &["AU64L"]),
+    ("eyeLookDownRight", &["AU64R"]),
+    ("eyeLookInLeft", &["AU62L"]),
+    ("eyeLookInRight", &["AU61R"]),
+    ("eyeLookOutLeft", &["AU61L"]),
+    ("eyeLookOutRight", &["AU62R"]),
+    ("eyeLookUpLeft", &["AU63L"]),
+    ("eyeLookUpRight", &["AU63R"]),
+    ("eyeSquintLeft", &["AU7L"]),
+    ("eyeSquintRight", &["AU7R"]),
+    ("eyeWideLeft", &["AU5L"]),
+    ("eyeWideRight", &["AU5R"]),
+    ("jawForward", &["AD29"]),
+    ("jawLeft", &["AD30L"]),
+    ("jawOpen", &["AU26", "AU27"]),
+    ("jawRight", &["AD30R"]),
+    ("mouthClose", &["AU8"]),
+    ("mouthDimpleLeft", &["AU14L"]),
+    ("mouthDimpleRight", &["AU14R"]),
+    ("mouthFrownLeft", &["AU15L"]),
+    ("mouthFrownRight", &["AU15R"]),
+    ("mouthFunnel", &["AU22"]),
+    ("mouthLowerDownLeft", &["AU16L"]),
+    ("mouthLowerDownRight", &["AU16R"]),
+    ("mouthPressLeft", &["AU24L", "AU23L"]),
+    ("mouthPressRight", &["AU24R", "AU23R"]),
+    ("mouthPucker", &["AU18"]),
+    ("mouthRollLower", &["AU28", "AD32"]),
+    ("mouthRollUpper", &["AU28"]),
+    ("mouthShrugLower", &["AU17"]),
+    ("mouthShrugUpper", &["AU17"]),
+    ("mouthSmileLeft", &["AU12L"]),
+    ("mouthSmileRight", &["AU12R"]),
+    ("mouthStretchLeft", &["AU20L"]),
+    ("mouthStretchRight", &["AU20R"]),
+    ("mouthUpperUpLeft", &["AU10L"]),
+    ("mouthUpperUpRight", &["AU10R"]),
+    ("noseSneerLeft", &["AU9L"]),
+    ("noseSneerRight", &["AU9R"]),
+    ("tongueOut", &["AD19"]),
+    // FACS has no unit for a mouth that moves to one side as a whole; what shows it is a one-sided stretch of the lips.
+    ("mouthLeft", &[]),
+    ("mouthRight", &[]),
+];
+
 /// Half of the face, the character's own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Side {
@@ -361,6 +440,31 @@ mod tests {
         for name in vocabulary() {
             assert_eq!(canonical(name), Some(name));
         }
+    }
+
+    #[test]
+    fn action_units_of_every_shape_keep_the_side() {
+        for name in vocabulary() {
+            let units = action_units(name);
+            let without = ["mouthLeft", "mouthRight", "pupilDilateLeft", "pupilDilateRight"].contains(&name);
+            assert_eq!(units.is_empty(), without, "{name}");
+            let mirrored = if name.ends_with("Left") {
+                name.replace("Left", "Right")
+            } else {
+                continue;
+            };
+            let mirror = |unit: &&str| match unit.split_at(unit.len() - 1) {
+                // The direction of a gaze mirrors too: 61 turns to the left, 62 to the right.
+                ("AU61", "L") => "AU62R".to_owned(),
+                ("AU62", "L") => "AU61R".to_owned(),
+                (number, "L") => format!("{number}R"),
+                _ => panic!("{name}: {unit} has no side"),
+            };
+            assert_eq!(units.iter().map(mirror).collect::<Vec<_>>(), action_units(&mirrored), "{name}");
+        }
+        assert!(ACTION_UNITS.iter().all(|(name, _)| canonical(name) == Some(name)));
+        assert_eq!(action_units("Face:EYEBLINK_R"), ["AU45R", "AU43R"]);
+        assert!(action_units("nonsense").is_empty());
     }
 
     #[test]

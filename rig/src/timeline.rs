@@ -58,6 +58,10 @@ pub struct Sequence {
     /// Weight of single shapes, added to what expressions do. `eyeBlink` moves both eyes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub shapes: BTreeMap<String, Track<f32>>,
+    /// A recorded performance that adds tracks of shapes and of the head. Tracks written here win over recorded ones.
+    /// The rig reads no recordings: whoever loads the sequence does (`rubor_assets::import::capture::load_into`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capture: Option<Capture>,
     /// Motion of the head as a whole.
     #[serde(default)]
     pub head: HeadMotion,
@@ -91,6 +95,24 @@ pub struct HeadMotion {
     /// Metres.
     #[serde(default)]
     pub translation: Track<[f32; 3]>,
+}
+
+/// A recording as a track.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct Capture {
+    /// Live Link Face `.csv`, MediaPipe or ARKit `.json`: a path in the folder of the sequence or below it.
+    pub file: String,
+    /// Which recorded channel moves which shape; a path as above. Without it, names decide.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub retarget: Option<String>,
+    /// Seconds of the sequence at which the recording starts, 0 or more.
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub start: f64,
+    /// Only the part between two times of the recording, seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trim: Option<[f64; 2]>,
 }
 
 /// Camera. `position`, `target` and `fovDegrees` each replace what the framing gives.
@@ -538,6 +560,7 @@ impl Sequence {
             expressions: BTreeMap::new(),
             states: BTreeMap::new(),
             shapes: BTreeMap::new(),
+            capture: None,
             head: HeadMotion::default(),
             camera: Camera::default(),
             lights: Vec::new(),
@@ -587,6 +610,18 @@ impl Sequence {
         }
         for (name, track) in &self.shapes {
             self.check_track(&steps!["shapes", name], track, any)?;
+        }
+        if let Some(capture) = &self.capture {
+            if !(capture.start >= 0.0 && capture.start <= LONGEST_S) {
+                let expected = "a time in seconds, from 0 to 86400";
+                return self.wrong(&steps!["capture", "start"], &capture.start.to_string(), expected);
+            }
+            if let Some([from, to]) = capture.trim
+                && !(from >= 0.0 && to > from)
+            {
+                let expected = "two times in seconds, the second after the first";
+                return self.wrong(&steps!["capture", "trim"], &format!("[{from}, {to}]"), expected);
+            }
         }
         self.check_track(&steps!["head", "yawDegrees"], &self.head.yaw_degrees, any)?;
         self.check_track(&steps!["head", "pitchDegrees"], &self.head.pitch_degrees, any)?;

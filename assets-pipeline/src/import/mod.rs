@@ -1,5 +1,6 @@
 //! Files to heads.
 
+pub mod capture;
 pub(crate) mod eye_projection;
 pub mod gltf;
 pub mod makehuman;

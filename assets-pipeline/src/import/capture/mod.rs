@@ -1,0 +1,188 @@
+//! Recorded performances to sequences.
+//!
+//! ```text
+//! Live Link Face .csv --live_link--+
+//! MediaPipe, ARKit .json ---json---+--> Recording --calibrate, smooth, resample--> Retarget --> Sequence + Report
+//! ```
+//!
+//! A recording keeps its own names and times. [`to_sequence`] takes away the neutral face, smooths jitter, samples at
+//! the frames of the sequence, maps names through a [`Retarget`] file and drops keys that a straight line replaces.
+//!
+//! ```
+//! use rubor_assets::import::capture::{Retarget, live_link, to_sequence};
+//! let csv = b"Timecode,BlendShapeCount,JawOpen\n00:00:01:00.000,1,0\n00:00:01:30.000,1,0.5\n00:00:02:00.000,1,1\n";
+//! let recording = live_link::from_bytes(csv, "take.csv".as_ref(), None)?;
+//! let (sequence, report) = to_sequence(&recording, &Retarget::default(), Some(24.0))?;
+//! assert_eq!(sequence.shapes["jawOpen"].at(0.5), 0.5);
+//! assert_eq!(report.mapped, [("JawOpen".to_owned(), "jawOpen".to_owned())]);
+//! # Ok::<(), rubor_assets::error::ImportError>(())
+//! ```
+
+mod convert;
+mod filter;
+pub mod json;
+pub mod live_link;
+mod retarget;
+mod timecode;
+
+use std::path::{Component, Path, PathBuf};
+
+use rubor_rig::timeline::{Key, Sequence, Track};
+
+pub use convert::{Report, to_sequence};
+pub use retarget::{HeadAngle, HeadRetarget, Neutral, Retarget, ShapeTarget, Smoothing, Targets};
+
+use crate::error::ImportError;
+
+/// A recorded performance as its file has it, times from 0.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recording {
+    /// File that it came from.
+    pub path: PathBuf,
+    /// Seconds since the first sample, strictly increasing; not always evenly spaced.
+    pub times_s: Vec<f64>,
+    /// Weights by name as written there, each with one value a sample.
+    pub channels: Vec<Channel>,
+    /// Rotation of the head where it was recorded.
+    pub head: Option<HeadAngles>,
+    /// What is odd about the file.
+    pub notes: Vec<String>,
+}
+
+/// One column of weights.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Channel {
+    /// As written in the file.
+    pub name: String,
+    /// Nominally 0 to 1; trackers go above.
+    pub values: Vec<f32>,
+}
+
+/// Rotation of the head, radians, with the signs of [`rubor_rig::timeline::HeadMotion`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HeadAngles {
+    /// Positive turns the face to the character's left.
+    pub yaw: Vec<f32>,
+    /// Positive lowers the chin.
+    pub pitch: Vec<f32>,
+    /// Positive leans the head to the character's right.
+    pub roll: Vec<f32>,
+}
+
+impl Recording {
+    /// Seconds from the first to the last sample.
+    pub fn length_s(&self) -> f64 {
+        self.times_s.last().copied().unwrap_or_default()
+    }
+
+    /// Samples a second: the median step's inverse, snapped to a common camera rate within 2 %.
+    pub fn rate(&self) -> f64 {
+        const COMMON: [f64; 8] = [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0];
+        let mut steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
+        if steps.is_empty() {
+            return 60.0;
+        }
+        let middle = steps.len() / 2;
+        let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+        let rate = (1.0 / *median).min(FASTEST);
+        COMMON.into_iter().find(|c| (rate / c - 1.0).abs() < 0.02).unwrap_or(rate)
+    }
+}
+
+/// Largest recording: an hour at 120 samples a second. What is longer is no take of a face.
+const MOST_SAMPLES: usize = 432_000;
+/// No tracker of faces is faster.
+const FASTEST: f64 = 1000.0;
+
+/// Reads a recording by the kind of its file: `.csv` as Live Link Face, `.json` as MediaPipe or ARKit.
+///
+/// # Errors
+/// Unreadable file, another extension, content that breaks the format.
+pub fn read(path: &Path) -> Result<Recording, ImportError> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let bytes = std::fs::read(path).map_err(ImportError::read(path))?;
+    match extension.as_str() {
+        "csv" => live_link::from_bytes(&bytes, path, None),
+        "json" => json::from_bytes(&bytes, path),
+        _ => {
+            let found = format!("the extension {extension:?}");
+            Err(ImportError::content(path, "name", found, ".csv (Live Link Face) or .json (MediaPipe, ARKit)"))
+        }
+    }
+}
+
+/// Loads the recording that the `capture` field of a sequence names and adds its tracks. `folder` is that of the
+/// sequence file: paths are relative to it and cannot leave it. Tracks that the sequence has itself win.
+///
+/// Returns `None` when the sequence has no capture.
+///
+/// # Errors
+/// As [`read`], [`Retarget::load`] and [`to_sequence`]; a path that is absolute or goes up.
+pub fn load_into(sequence: &mut Sequence, folder: &Path) -> Result<Option<Report>, ImportError> {
+    let Some(capture) = sequence.capture.take() else { return Ok(None) };
+    let mut recording = read(&inside(folder, &capture.file)?)?;
+    let retarget = match &capture.retarget {
+        Some(file) => Retarget::load(&inside(folder, file)?)?,
+        None => Retarget::default(),
+    };
+    if let Some([from, to]) = capture.trim {
+        trim(&mut recording, from, to)?;
+    }
+    let (captured, report) = to_sequence(&recording, &retarget, Some(sequence.fps))?;
+    for (name, track) in captured.shapes {
+        sequence.shapes.entry(name).or_insert_with(|| shifted(track, capture.start));
+    }
+    let head = &mut sequence.head;
+    for (own, track) in [
+        (&mut head.yaw_degrees, captured.head.yaw_degrees),
+        (&mut head.pitch_degrees, captured.head.pitch_degrees),
+        (&mut head.roll_degrees, captured.head.roll_degrees),
+    ] {
+        if *own == Track::default() {
+            *own = shifted(track, capture.start);
+        }
+    }
+    Ok(Some(report))
+}
+
+/// Samples between two times, the first of them at 0.
+fn trim(recording: &mut Recording, from_s: f64, to_s: f64) -> Result<(), ImportError> {
+    let start = recording.times_s.partition_point(|t| *t < from_s);
+    let end = recording.times_s.partition_point(|t| *t <= to_s);
+    let Some(first) = recording.times_s.get(start).copied().filter(|_| start < end) else {
+        let found = format!("[{from_s}, {to_s}]");
+        let expected = format!("two times within the {} s of the recording", recording.length_s());
+        return Err(ImportError::content(&recording.path, "trim", found, expected));
+    };
+    recording.times_s = recording.times_s[start..end].iter().map(|t| t - first).collect();
+    let cut = |values: &mut Vec<f32>| {
+        values.truncate(end);
+        values.drain(..start);
+    };
+    recording.channels.iter_mut().for_each(|c| cut(&mut c.values));
+    if let Some(head) = &mut recording.head {
+        [&mut head.yaw, &mut head.pitch, &mut head.roll].into_iter().for_each(cut);
+    }
+    Ok(())
+}
+
+fn shifted(track: Track<f32>, start_s: f64) -> Track<f32> {
+    match track {
+        Track::Keys(keys) => Track::Keys(keys.into_iter().map(|k| Key { t: k.t + start_s, ..k }).collect()),
+        constant => constant,
+    }
+}
+
+/// The path of a file that stays in the folder.
+fn inside(folder: &Path, file: &str) -> Result<PathBuf, ImportError> {
+    let path = Path::new(file);
+    let stays = path.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+    if !stays || file.is_empty() {
+        let expected = "a path relative to the sequence's folder that does not leave it";
+        return Err(ImportError::content(folder, "capture", format!("{file:?}"), expected));
+    }
+    Ok(folder.join(path))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,212 @@
+//! What a Maya scene has no place for: maps with their units, original names, landmarks, provenance.
+//!
+//! It stands as JSON in one string attribute of the head's transform, `ruborFacialAppearance`, so it survives every
+//! edit and save in Maya. Maps are 16-bit PNG files beside the scene: `value = offset + scale * texel / 65535`, two
+//! channels below each other, at most half a step (1/131070 of the map's range) from the values.
+
+use std::collections::BTreeMap;
+use std::path::{Component, Path};
+
+use glam::Vec3;
+use image::ImageEncoder;
+use rubor_rig::head::{Distribution, Head, Material, Provenance, SkinMaps, WrinkleZone};
+use rubor_rig::map::Map;
+use serde::{Deserialize, Serialize};
+
+/// Version of the layout.
+const VERSION: u32 = 1;
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct Appearance {
+    pub(crate) version: u32,
+    pub(crate) name: String,
+    /// In the order of the object groups of the mesh.
+    pub(crate) parts: Vec<PartEntry>,
+    /// Names of the targets in their order, as rubor spells them.
+    pub(crate) shapes: Vec<String>,
+    #[serde(default)]
+    pub(crate) landmarks: BTreeMap<String, Vec3>,
+    #[serde(default)]
+    pub(crate) provenance: Vec<Provenance>,
+    #[serde(default)]
+    pub(crate) occlusion: Vec<f32>,
+    #[serde(default)]
+    pub(crate) maps: Vec<MapEntry>,
+    #[serde(default)]
+    pub(crate) hair_color_linear: [f32; 3],
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct PartEntry {
+    pub(crate) name: String,
+    pub(crate) material: Material,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct MapEntry {
+    /// `melanin`, `distributionScale`, `zone`, ...
+    pub(crate) role: String,
+    /// Of a distribution or a zone.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub(crate) name: String,
+    /// Wrinkle map of a zone.
+    #[serde(default)]
+    pub(crate) wrinkle_map: u32,
+    /// File name beside the scene.
+    pub(crate) file: String,
+    pub(crate) offset: Vec<f32>,
+    pub(crate) scale: Vec<f32>,
+}
+
+impl Appearance {
+    /// Entries of a head; maps go to files named `stem_role.png`, returned with their bytes.
+    pub(crate) fn of(head: &Head, stem: &str) -> Result<(Self, Vec<(String, Vec<u8>)>), (String, String)> {
+        let mut appearance = Self {
+            version: VERSION,
+            name: head.name.clone(),
+            parts: (head.mesh.parts.iter())
+                .map(|p| PartEntry { name: p.name.clone(), material: p.material })
+                .collect(),
+            shapes: head.shapes.iter().map(|s| s.name.clone()).collect(),
+            landmarks: head.landmarks.clone(),
+            provenance: head.provenance.clone(),
+            occlusion: head.mesh.occlusion.clone(),
+            maps: Vec::new(),
+            hair_color_linear: head.maps.hair_color_linear,
+        };
+        let mut files = Vec::new();
+        let maps = &head.maps;
+        let mut add = |role: &str, name: &str, wrinkle_map: u32, map: &Map| {
+            let file = format!("{stem}_{role}{}.png", if files.is_empty() { String::new() } else { format!("_{}", files.len()) });
+            let (bytes, offset, scale) = encode(map).map_err(|reason| (format!("map {role} {name}"), reason))?;
+            files.push((file.clone(), bytes));
+            let entry = MapEntry { role: role.into(), name: name.into(), wrinkle_map, file, offset, scale };
+            appearance.maps.push(entry);
+            Ok::<(), (String, String)>(())
+        };
+        let single = [
+            ("melanin", &maps.melanin),
+            ("hemoglobin", &maps.hemoglobin),
+            ("hemoglobinMean", &maps.hemoglobin_mean),
+            ("slopes", &maps.slopes),
+            ("specular", &maps.specular),
+            ("scattering", &maps.scattering),
+            ("hair", &maps.hair),
+        ];
+        for (role, map) in single {
+            if let Some(map) = map {
+                add(role, "", 0, map)?;
+            }
+        }
+        for d in &maps.distributions {
+            add("distributionScale", &d.name, 0, &d.scale)?;
+            add("distributionBias", &d.name, 0, &d.bias)?;
+        }
+        for map in &maps.wrinkle_slopes {
+            add("wrinkleSlopes", "", 0, map)?;
+        }
+        for zone in &maps.zones {
+            add("zone", &zone.name, zone.wrinkle_map, &zone.mask)?;
+        }
+        Ok((appearance, files))
+    }
+
+    pub(crate) fn parse(json: &str) -> Result<Self, String> {
+        let read: Self = serde_json::from_str(json).map_err(|e| e.to_string())?;
+        if read.version != VERSION {
+            return Err(format!("version {}, where {VERSION} is known", read.version));
+        }
+        Ok(read)
+    }
+
+    /// Reads the maps beside the scene. What cannot be read is named and left out.
+    pub(crate) fn load_maps(&self, folder: &Path, notes: &mut Vec<String>) -> SkinMaps {
+        let mut maps = SkinMaps { hair_color_linear: self.hair_color_linear, ..SkinMaps::default() };
+        let mut scales: BTreeMap<String, Map> = BTreeMap::new();
+        for entry in &self.maps {
+            let map = match load(entry, folder) {
+                Ok(map) => map,
+                Err(reason) => {
+                    notes.push(format!("the map {} {} was left out: {reason}", entry.role, entry.name));
+                    continue;
+                }
+            };
+            match entry.role.as_str() {
+                "melanin" => maps.melanin = Some(map),
+                "hemoglobin" => maps.hemoglobin = Some(map),
+                "hemoglobinMean" => maps.hemoglobin_mean = Some(map),
+                "slopes" => maps.slopes = Some(map),
+                "specular" => maps.specular = Some(map),
+                "scattering" => maps.scattering = Some(map),
+                "hair" => maps.hair = Some(map),
+                "distributionScale" => {
+                    scales.insert(entry.name.clone(), map);
+                }
+                "distributionBias" => {
+                    if let Some(scale) = scales.remove(&entry.name) {
+                        maps.distributions.push(Distribution { name: entry.name.clone(), scale, bias: map });
+                    }
+                }
+                "wrinkleSlopes" => maps.wrinkle_slopes.push(map),
+                "zone" => maps.zones.push(WrinkleZone {
+                    name: entry.name.clone(),
+                    wrinkle_map: entry.wrinkle_map,
+                    mask: map,
+                }),
+                other => notes.push(format!("the map role {other:?} is not known and was left out")),
+            }
+        }
+        maps
+    }
+}
+
+/// 16-bit PNG of a map over its own range, channels below each other.
+fn encode(map: &Map) -> Result<(Vec<u8>, Vec<f32>, Vec<f32>), String> {
+    let channels = map.channels as usize;
+    let mut bytes = Vec::with_capacity(map.values.len() * 2);
+    let (mut offsets, mut scales) = (Vec::new(), Vec::new());
+    for c in 0..channels {
+        let values = || map.values.iter().skip(c).step_by(channels).copied();
+        let (low, high) = values().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let range = high - low;
+        for v in values() {
+            let share = if range > 0.0 { f64::from(v - low) / f64::from(range) } else { 0.0 };
+            // The encoder takes the byte order of the machine.
+            bytes.extend_from_slice(&((share * 65535.0).round() as u16).to_ne_bytes());
+        }
+        offsets.push(low);
+        scales.push(range);
+    }
+    let mut png = Vec::new();
+    image::codecs::png::PngEncoder::new(&mut png)
+        .write_image(&bytes, map.width, map.height * map.channels, image::ExtendedColorType::L16)
+        .map_err(|e| e.to_string())?;
+    Ok((png, offsets, scales))
+}
+
+fn load(entry: &MapEntry, folder: &Path) -> Result<Map, String> {
+    let file = Path::new(&entry.file);
+    if file.components().count() != 1 || !matches!(file.components().next(), Some(Component::Normal(_))) {
+        return Err(format!("{:?} is no name of a file beside the scene", entry.file));
+    }
+    let channels = entry.offset.len();
+    if channels == 0 || channels != entry.scale.len() || channels > 4 {
+        return Err(format!("{channels} offsets and {} scales", entry.scale.len()));
+    }
+    let bytes = std::fs::read(folder.join(file)).map_err(|e| format!("{}: {e}", entry.file))?;
+    let image = image::load_from_memory(&bytes).map_err(|e| format!("{}: {e}", entry.file))?.into_luma16();
+    let (width, height) = (image.width(), image.height() / channels as u32);
+    if height == 0 || height * channels as u32 != image.height() {
+        return Err(format!("{}: {} rows for {channels} channels", entry.file, image.height()));
+    }
+    let texels = image.into_raw();
+    let plane = width as usize * height as usize;
+    let value = |i: usize| {
+        let (texel, c) = (i / channels, i % channels);
+        let share = f64::from(texels[c * plane + texel]) / 65535.0;
+        (f64::from(entry.offset[c]) + f64::from(entry.scale[c]) * share) as f32
+    };
+    Ok(Map { width, height, channels: channels as u32, values: (0..plane * channels).map(value).collect() })
+}

@@ -1,0 +1,5 @@
+//! Maya ASCII as text: words, statements, nodes.
+
+pub(crate) mod lexer;
+pub(crate) mod parser;
+pub(crate) mod scene;

@@ -1,0 +1,863 @@
+//! Statements to a [`Scene`]: one pass, values go straight to where they stay.
+
+use super::lexer::{Lexer, Token};
+use super::scene::{BlendShapeData, CurveData, Data, MeshData, Node, NodeId, Plug, PolyCube, Scene, Transform};
+use crate::error::Fault;
+
+/// Largest index of an array attribute: a scene that names a larger one is broken, and would fill the memory.
+const LARGEST_INDEX: u64 = 50_000_000;
+
+/// Plugins whose nodes carry nothing that a head needs.
+const HARMLESS_PLUGINS: [&str; 8] =
+    ["stereoCamera", "mtoa", "mayaUsdPlugin", "fbxmaya", "Turtle", "renderSetup", "modelingToolkit", "ATFPlugin"];
+
+/// Reads a scene.
+pub(crate) fn parse(bytes: &[u8]) -> Result<Scene, Fault> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    if bytes.starts_with(b"FOR4") || bytes.starts_with(b"FOR8") {
+        return Err(Fault::new(1, "a Maya binary scene (.mb)", "Maya ASCII: save the scene as .ma"));
+    }
+    let mut parser = Parser { lexer: Lexer::new(bytes), scene: Scene::default(), current: None, links: Vec::new() };
+    let mut statements = 0;
+    let mut known = 0;
+    while let Some(token) = parser.lexer.next()? {
+        statements += 1;
+        let Token::Word(command) = token else {
+            // Stray texts and signs between statements.
+            continue;
+        };
+        known += 1;
+        match command {
+            b"createNode" => parser.create_node()?,
+            b"setAttr" => parser.set_attr()?,
+            b"connectAttr" => parser.connect()?,
+            b"select" => parser.select()?,
+            b"currentUnit" => parser.current_unit()?,
+            b"requires" => parser.requires()?,
+            b"file" => parser.reference()?,
+            b"rename" | b"addAttr" | b"fileInfo" | b"lockNode" | b"parent" | b"relationship" | b"dataStructure"
+            | b"applyMetadata" | b"editMetadata" | b"namespace" | b"workspace" | b"evaluator" | b"disconnectAttr"
+            | b"scriptJob" | b"source" | b"python" | b"warning" | b"undo" => parser.lexer.skip_statement()?,
+            _ => {
+                known -= 1;
+                parser.lexer.skip_statement()?;
+            }
+        }
+    }
+    if known == 0 {
+        let found = if statements == 0 { "no statement" } else { "no statement of a Maya scene" };
+        return Err(Fault::new(1, found, "Maya ASCII (createNode, setAttr, connectAttr)"));
+    }
+    parser.resolve_links();
+    Ok(parser.scene)
+}
+
+struct Parser<'a> {
+    lexer: Lexer<'a>,
+    scene: Scene,
+    /// Node that `setAttr ".x"` speaks of.
+    current: Option<NodeId>,
+    /// Connections as written; nodes may be created after them.
+    links: Vec<(Box<str>, Box<str>)>,
+}
+
+/// An attribute path: `.it[0].itg[3].iti[6000].ipt` is `it`, 0, `itg`, 3, ...
+#[derive(Debug)]
+struct Attribute<'t> {
+    steps: Vec<(&'t str, Option<(u32, u32)>)>,
+}
+
+impl<'t> Attribute<'t> {
+    fn parse(text: &'t str, line: usize) -> Result<Self, Fault> {
+        let wrong = || Fault::new(line, format!("attribute {text:?}"), "a name with indices such as .vt[0:7]");
+        let mut steps = Vec::new();
+        for part in text.split('.').filter(|p| !p.is_empty()) {
+            let Some((name, rest)) = part.split_once('[') else {
+                steps.push((part, None));
+                continue;
+            };
+            let range = rest.strip_suffix(']').ok_or_else(wrong)?;
+            let (from, to) = range.split_once(':').unwrap_or((range, range));
+            let index = |s: &str| s.parse::<u64>().ok().filter(|i| *i <= LARGEST_INDEX).map(|i| i as u32);
+            let (from, to) = (index(from).ok_or_else(wrong)?, index(to).ok_or_else(wrong)?);
+            if to < from {
+                return Err(wrong());
+            }
+            steps.push((name, Some((from, to))));
+        }
+        Ok(Self { steps })
+    }
+
+    fn last(&self) -> (&'t str, Option<(u32, u32)>) {
+        self.steps.last().copied().unwrap_or(("", None))
+    }
+
+    /// Names joined, long names made short.
+    fn key(&self) -> String {
+        self.steps.iter().map(|(name, _)| short(name)).collect::<Vec<_>>().join(".")
+    }
+
+    fn index(&self, step: usize) -> u32 {
+        self.steps.get(step).and_then(|s| s.1).map_or(0, |r| r.0)
+    }
+}
+
+/// Short name of an attribute that scenes also write long.
+fn short(name: &str) -> &str {
+    match name {
+        "vrts" => "vt",
+        "edge" => "ed",
+        "face" => "fc",
+        "pnts" => "pt",
+        "uvSet" => "uvst",
+        "uvSetPoints" => "uvsp",
+        "uvSetName" => "uvsn",
+        "currentUVSet" => "cuvs",
+        "intermediateObject" => "io",
+        "visibility" => "v",
+        "translate" => "t",
+        "rotate" => "r",
+        "scale" => "s",
+        "translateX" => "tx",
+        "translateY" => "ty",
+        "translateZ" => "tz",
+        "rotateX" => "rx",
+        "rotateY" => "ry",
+        "rotateZ" => "rz",
+        "scaleX" => "sx",
+        "scaleY" => "sy",
+        "scaleZ" => "sz",
+        "rotateOrder" => "ro",
+        "rotatePivot" => "rp",
+        "rotatePivotTranslate" => "rpt",
+        "scalePivot" => "sp",
+        "scalePivotTranslate" => "spt",
+        "jointOrient" => "jo",
+        "rotateAxis" => "ra",
+        "weight" => "w",
+        "envelope" => "en",
+        "inputTarget" => "it",
+        "inputTargetGroup" => "itg",
+        "inputTargetItem" => "iti",
+        "inputPointsTarget" => "ipt",
+        "inputComponentsTarget" => "ict",
+        "inputGeomTarget" => "igt",
+        "attributeAliasList" => "aal",
+        "inBetweenInfoGroup" => "ibig",
+        "inBetweenInfo" => "ibi",
+        "inBetweenTargetName" => "ibtn",
+        "keyTimeValue" => "ktv",
+        "keyTanInType" => "kit",
+        "keyTanOutType" => "kot",
+        "keyTanInX" => "kix",
+        "keyTanInY" => "kiy",
+        "keyTanOutX" => "kox",
+        "keyTanOutY" => "koy",
+        "tangentType" => "tan",
+        "weightedTangents" => "wgt",
+        "preInfinity" => "pre",
+        "postInfinity" => "pst",
+        "output" => "o",
+        "outMesh" => "o",
+        "worldMesh" => "w",
+        "inMesh" => "i",
+        "input" => "ip",
+        "inputGeometry" => "ig",
+        "outputGeometry" => "og",
+        "instObjGroups" => "iog",
+        "objectGroups" => "og",
+        "objectGrpCompList" => "gcl",
+        "dagSetMembers" => "dsm",
+        "before" => "b",
+        "ruborFacialAppearance" => "rfa",
+        other => other,
+    }
+}
+
+impl<'a> Parser<'a> {
+    fn number(&mut self) -> Result<Option<f64>, Fault> {
+        match self.lexer.argument()? {
+            None => Ok(None),
+            Some(Token::Word(word)) => match number(word) {
+                Some(n) => Ok(Some(n)),
+                None => {
+                    let found = format!("{:?}", String::from_utf8_lossy(word));
+                    Err(Fault::new(self.lexer.line(), found, "a finite number"))
+                }
+            },
+            Some(Token::Text(text)) => Err(Fault::new(self.lexer.line(), format!("{text:?}"), "a number")),
+            Some(Token::End) => Ok(None),
+        }
+    }
+
+    fn needed(&mut self) -> Result<f64, Fault> {
+        let line = self.lexer.line();
+        self.number()?.ok_or_else(|| Fault::new(line, "the end of the statement", "a number"))
+    }
+
+    fn triple(&mut self) -> Result<[f64; 3], Fault> {
+        Ok([self.needed()?, self.needed()?, self.needed()?])
+    }
+
+    /// Three numbers, or none at the end of the statement.
+    fn next_triple(&mut self) -> Result<Option<[f64; 3]>, Fault> {
+        match self.number()? {
+            None => Ok(None),
+            Some(x) => Ok(Some([x, self.needed()?, self.needed()?])),
+        }
+    }
+
+    fn count(&mut self, what: &str) -> Result<u32, Fault> {
+        let value = self.needed()?;
+        if value >= 0.0 && value <= LARGEST_INDEX as f64 && value.fract() == 0.0 {
+            return Ok(value as u32);
+        }
+        Err(Fault::new(self.lexer.line(), value.to_string(), format!("{what}: a whole number of 0 or more")))
+    }
+
+    fn flag_on(&mut self) -> Result<bool, Fault> {
+        Ok(match self.lexer.argument()? {
+            Some(Token::Word(word)) => matches!(word, b"yes" | b"on" | b"true" | b"1"),
+            _ => false,
+        })
+    }
+
+    fn text(&mut self) -> Result<Option<String>, Fault> {
+        loop {
+            match self.lexer.argument()? {
+                Some(Token::Text(text)) => return Ok(Some(text.into_owned())),
+                Some(_) => {}
+                None => return Ok(None),
+            }
+        }
+    }
+
+    fn create_node(&mut self) -> Result<(), Fault> {
+        let line = self.lexer.line();
+        let Some(Token::Word(kind)) = self.lexer.argument()? else {
+            return Err(Fault::new(line, "createNode without a type", "a node type"));
+        };
+        let kind = String::from_utf8_lossy(kind).into_owned();
+        let (mut name, mut parent) = (None, None);
+        while let Some(token) = self.lexer.argument()? {
+            match token {
+                Token::Word(b"-n" | b"-name") => name = self.text_argument()?,
+                Token::Word(b"-p" | b"-parent") => {
+                    let written = self.text_argument()?;
+                    if let Some(written) = written {
+                        parent = self.scene.find(&written);
+                        if parent.is_none() {
+                            let expected = "a parent that was created before";
+                            return Err(Fault::new(line, format!("the parent {written:?}"), expected));
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+        self.lexer.skip_statement()?;
+        let data = match kind.as_str() {
+            "transform" | "joint" => Data::Transform(Transform::default()),
+            "mesh" => Data::Mesh(Box::<MeshData>::default()),
+            "blendShape" => Data::BlendShape(Box::<BlendShapeData>::default()),
+            "animCurveTL" | "animCurveTA" | "animCurveTU" => Data::Curve(Box::<CurveData>::default()),
+            "polyCube" => Data::PolyCube(PolyCube::default()),
+            "script" => Data::Script(String::new()),
+            _ => Data::Other,
+        };
+        let name = name.unwrap_or_else(|| format!("{kind}{}", self.scene.nodes.len()));
+        self.current = Some(self.scene.add(Node { kind, name, parent, line, data }));
+        Ok(())
+    }
+
+    fn text_argument(&mut self) -> Result<Option<String>, Fault> {
+        Ok(match self.lexer.argument()? {
+            Some(Token::Text(text)) => Some(text.into_owned()),
+            Some(Token::Word(word)) => Some(String::from_utf8_lossy(word).into_owned()),
+            _ => None,
+        })
+    }
+
+    /// `select -ne :time1;` makes a default node the current one.
+    fn select(&mut self) -> Result<(), Fault> {
+        let mut last = None;
+        while let Some(token) = self.lexer.argument()? {
+            last = match token {
+                Token::Word(word) if !word.starts_with(b"-") => Some(String::from_utf8_lossy(word).into_owned()),
+                Token::Text(text) => Some(text.into_owned()),
+                _ => last,
+            };
+        }
+        self.current = last.and_then(|name| self.scene.find(&name));
+        self.lexer.skip_statement()
+    }
+
+    fn current_unit(&mut self) -> Result<(), Fault> {
+        while let Some(token) = self.lexer.argument()? {
+            let Token::Word(flag) = token else { continue };
+            let Some(value) = self.text_argument()? else { break };
+            let line = self.lexer.line();
+            let wrong = |expected: &str| Fault::new(line, format!("the unit {value:?}"), expected);
+            match flag {
+                b"-l" | b"-linear" => {
+                    self.scene.metres = metres(&value).ok_or_else(|| wrong("mm, cm, m, km, in, ft, yd or mi"))?;
+                }
+                b"-a" | b"-angle" => {
+                    self.scene.radians = match value.as_str() {
+                        "deg" | "degree" => std::f64::consts::PI / 180.0,
+                        "rad" | "radian" => 1.0,
+                        _ => return Err(wrong("degree or radian")),
+                    }
+                }
+                b"-t" | b"-time" => {
+                    self.scene.fps = fps(&value).ok_or_else(|| wrong("film, pal, ntsc, 48fps, ..."))?;
+                }
+                _ => {}
+            }
+        }
+        self.lexer.skip_statement()
+    }
+
+    fn requires(&mut self) -> Result<(), Fault> {
+        let mut words = Vec::new();
+        while let Some(token) = self.lexer.argument()? {
+            match token {
+                Token::Word(w) if w.starts_with(b"-") => {
+                    self.lexer.argument()?;
+                }
+                Token::Word(w) => words.push(String::from_utf8_lossy(w).into_owned()),
+                Token::Text(t) => words.push(t.into_owned()),
+                Token::End => {}
+            }
+        }
+        if let Some(plugin) = words.first()
+            && plugin != "maya"
+            && !HARMLESS_PLUGINS.contains(&plugin.as_str())
+        {
+            let note = format!("the scene requires {}: its nodes are not read", words.join(" "));
+            if !self.scene.notes.contains(&note) {
+                self.scene.notes.push(note);
+            }
+        }
+        self.lexer.skip_statement()
+    }
+
+    fn reference(&mut self) -> Result<(), Fault> {
+        let line = self.lexer.line();
+        let mut last = None;
+        let mut is_reference = false;
+        while let Some(token) = self.lexer.argument()? {
+            match token {
+                Token::Word(b"-r" | b"-reference") => is_reference = true,
+                Token::Text(text) => last = Some(text.into_owned()),
+                _ => {}
+            }
+        }
+        if let Some(file) = last.filter(|_| is_reference) {
+            self.scene.notes.push(format!(
+                "line {line}: the reference {file:?} is not followed; import it into the scene in Maya"
+            ));
+        }
+        self.lexer.skip_statement()
+    }
+
+    fn connect(&mut self) -> Result<(), Fault> {
+        let line = self.lexer.line();
+        let (Some(from), Some(to)) = (self.text()?, self.text()?) else {
+            return Err(Fault::new(line, "connectAttr with less than two attributes", "a source and a destination"));
+        };
+        self.links.push((from.into(), to.into()));
+        self.lexer.skip_statement()
+    }
+
+    fn resolve_links(&mut self) {
+        for (from, to) in std::mem::take(&mut self.links) {
+            if let (Some(from), Some(to)) = (self.plug(&from), self.plug(&to)) {
+                self.scene.connect(from, to);
+            }
+        }
+    }
+
+    fn plug(&self, text: &str) -> Option<Plug> {
+        let (node, attribute) = text.split_once('.')?;
+        let short_steps = attribute.split('.').map(|step| match step.split_once('[') {
+            Some((name, index)) => format!("{}[{index}", short(name)),
+            None => short(step).to_owned(),
+        });
+        Some(Plug { node: self.scene.find(node)?, attribute: short_steps.collect::<Vec<_>>().join(".") })
+    }
+
+    fn set_attr(&mut self) -> Result<(), Fault> {
+        let line = self.lexer.line();
+        // Flags stand before the name, and only the name is in quotes.
+        let Some(written) = self.text()? else { return self.lexer.skip_statement() };
+        let (node, path) = match written.split_once('.') {
+            Some(("", path)) => (self.current, path),
+            Some((node, path)) => (self.scene.find(node), path),
+            None => return self.lexer.skip_statement(),
+        };
+        let Some(id) = node else { return self.lexer.skip_statement() };
+        // Taken out while it is filled, so that the parser can be used meanwhile.
+        let mut data = std::mem::replace(&mut self.scene.nodes[id].data, Data::Other);
+        let result = match &mut data {
+            Data::Other => Ok(()),
+            data => match Attribute::parse(path, line) {
+                Ok(attribute) => self.fill(data, &attribute, line),
+                Err(fault) => Err(fault),
+            },
+        };
+        self.scene.nodes[id].data = data;
+        result?;
+        self.lexer.skip_statement()
+    }
+
+    fn fill(&mut self, data: &mut Data, attribute: &Attribute<'_>, line: usize) -> Result<(), Fault> {
+        self.lexer.skip_type()?;
+        if self.lexer.at_end()? {
+            // `setAttr -l on ".tx";` and `setAttr -s 8 ".vt";` set no value.
+            return Ok(());
+        }
+        match data {
+            Data::Transform(transform) => self.fill_transform(transform, &attribute.key()),
+            Data::Mesh(mesh) => self.fill_mesh(mesh, attribute, line),
+            Data::BlendShape(shape) => self.fill_blend_shape(shape, attribute, line),
+            Data::Curve(curve) => self.fill_curve(curve, attribute),
+            Data::PolyCube(cube) => {
+                let metres = self.scene.metres;
+                match attribute.key().as_str() {
+                    "w" => cube.size_m[0] = self.needed()? * metres,
+                    "h" => cube.size_m[1] = self.needed()? * metres,
+                    "d" => cube.size_m[2] = self.needed()? * metres,
+                    "sw" => cube.segments[0] = self.count("segments")?,
+                    "sh" => cube.segments[1] = self.count("segments")?,
+                    "sd" => cube.segments[2] = self.count("segments")?,
+                    _ => {}
+                }
+                Ok(())
+            }
+            Data::Script(body) => {
+                if attribute.key() == "b"
+                    && let Some(text) = self.text()?
+                {
+                    *body = text;
+                }
+                Ok(())
+            }
+            Data::Other => Ok(()),
+        }
+    }
+
+    fn fill_transform(&mut self, transform: &mut Transform, key: &str) -> Result<(), Fault> {
+        // Centimetres in a unit of length.
+        let length = self.scene.metres * 100.0;
+        let angle = self.scene.radians;
+        let scaled = |v: [f64; 3], unit: f64| v.map(|c| c * unit);
+        match key {
+            "t" => transform.translate_cm = scaled(self.triple()?, length),
+            "r" => transform.rotate = scaled(self.triple()?, angle),
+            "s" => transform.scale = self.triple()?,
+            "tx" | "t.tx" => transform.translate_cm[0] = self.needed()? * length,
+            "ty" | "t.ty" => transform.translate_cm[1] = self.needed()? * length,
+            "tz" | "t.tz" => transform.translate_cm[2] = self.needed()? * length,
+            "rx" | "r.rx" => transform.rotate[0] = self.needed()? * angle,
+            "ry" | "r.ry" => transform.rotate[1] = self.needed()? * angle,
+            "rz" | "r.rz" => transform.rotate[2] = self.needed()? * angle,
+            "sx" | "s.sx" => transform.scale[0] = self.needed()?,
+            "sy" | "s.sy" => transform.scale[1] = self.needed()?,
+            "sz" | "s.sz" => transform.scale[2] = self.needed()?,
+            "ro" => transform.order = self.count("rotate order")?.min(5) as u8,
+            "rp" => transform.rotate_pivot_cm = scaled(self.triple()?, length),
+            "rpt" => transform.rotate_pivot_translate_cm = scaled(self.triple()?, length),
+            "sp" => transform.scale_pivot_cm = scaled(self.triple()?, length),
+            "spt" => transform.scale_pivot_translate_cm = scaled(self.triple()?, length),
+            "jo" => transform.joint_orient = scaled(self.triple()?, angle),
+            "ra" => transform.rotate_axis = scaled(self.triple()?, angle),
+            "v" => transform.visible = self.visibility()?,
+            "rfa" => transform.facial_appearance = self.text()?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A `setAttr -k off ".v";` without a value says nothing about visibility.
+    fn visibility(&mut self) -> Result<bool, Fault> {
+        Ok(!matches!(self.lexer.argument()?, Some(Token::Word(b"no" | b"off" | b"false" | b"0"))))
+    }
+
+    fn fill_mesh(&mut self, mesh: &mut MeshData, attribute: &Attribute<'_>, line: usize) -> Result<(), Fault> {
+        let (_, range) = attribute.last();
+        let metres = self.scene.metres;
+        let in_metres = |v: [f64; 3]| v.map(|c| (c * metres) as f32);
+        match attribute.key().as_str() {
+            "vt" => {
+                let Some((from, _)) = range else { return Ok(()) };
+                self.expect_end_of(from, mesh.points.len(), ".vt", line)?;
+                while let Some(point) = self.next_triple()? {
+                    mesh.points.push(in_metres(point));
+                }
+            }
+            "pt" => {
+                let Some((from, _)) = range else { return Ok(()) };
+                let mut index = from;
+                while let Some(tweak) = self.next_triple()? {
+                    mesh.tweaks.insert(index, in_metres(tweak));
+                    index = index.saturating_add(1);
+                }
+            }
+            "ed" => {
+                let Some((from, _)) = range else { return Ok(()) };
+                self.expect_end_of(from, mesh.edges.len(), ".ed", line)?;
+                while let Some(start) = self.number()? {
+                    let end = self.needed()?;
+                    let _smooth = self.needed()?;
+                    mesh.edges.push([whole(start, line)?, whole(end, line)?]);
+                }
+            }
+            "fc" => {
+                let Some((from, _)) = range else { return Ok(()) };
+                self.expect_end_of(from, mesh.face_ends.len(), ".fc", line)?;
+                self.faces(mesh)?;
+            }
+            "uvst.uvsp" => {
+                let Some((from, _)) = range else { return Ok(()) };
+                let set = mesh.uv_sets.entry(attribute.index(0)).or_default();
+                self.expect_end_of(from, set.uvs.len(), ".uvsp", line)?;
+                while let Some(u) = self.number()? {
+                    // Maya's v grows upwards.
+                    set.uvs.push([u as f32, (1.0 - self.needed()?) as f32]);
+                }
+            }
+            "uvst.uvsn" => {
+                let name = self.text()?.unwrap_or_default();
+                mesh.uv_sets.entry(attribute.index(0)).or_default().name = name;
+            }
+            "cuvs" => mesh.current_uv_set = self.text()?,
+            "io" => mesh.intermediate = self.flag_on()?,
+            "v" => mesh.hidden = !self.visibility()?,
+            "iog.og.gcl" => {
+                let group = attribute.index(1);
+                let (ranges, _) = self.components("f", line)?;
+                mesh.face_groups.insert(group, ranges);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Blocks of an array must follow one another, as Maya writes them.
+    fn expect_end_of(&self, from: u32, have: usize, name: &str, line: usize) -> Result<(), Fault> {
+        if from as usize == have {
+            return Ok(());
+        }
+        Err(Fault::new(line, format!("{name}[{from}:..] after {have} elements"), format!("{name}[{have}:..]")))
+    }
+
+    fn faces(&mut self, mesh: &mut MeshData) -> Result<(), Fault> {
+        while let Some(token) = self.lexer.argument()? {
+            let line = self.lexer.line();
+            let Token::Word(word) = token else { continue };
+            match word {
+                b"f" => {
+                    let count = self.count("edges of a face")?;
+                    for _ in 0..count {
+                        let edge = self.needed()?;
+                        if !(edge.abs() <= LARGEST_INDEX as f64 && edge.fract() == 0.0) {
+                            return Err(Fault::new(line, edge.to_string(), "an edge"));
+                        }
+                        mesh.corners.push(edge as i32);
+                    }
+                    mesh.face_ends.push(mesh.corners.len() as u32);
+                }
+                b"h" => {
+                    mesh.holes += 1;
+                    for _ in 0..self.count("edges of a hole")? {
+                        self.needed()?;
+                    }
+                }
+                b"mu" => {
+                    let set = self.count("texture coordinate set")?;
+                    let count = self.count("texture coordinates of a face")?;
+                    let end = mesh.corners.len();
+                    // Coordinates belong to the face before them, the last corners that there are.
+                    let start = match mesh.face_ends.len() {
+                        0 => end,
+                        1 => 0,
+                        n => mesh.face_ends[n - 2] as usize,
+                    };
+                    let uvs = mesh.corner_uvs.entry(set).or_default();
+                    uvs.resize(start.max(uvs.len()), u32::MAX);
+                    for _ in 0..count {
+                        let uv = self.needed()?;
+                        if uvs.len() < end {
+                            uvs.push(whole(uv, line)?);
+                        }
+                    }
+                }
+                // Colours and the like: a set, a count and the values, or only the count.
+                b"mc" => {
+                    self.needed()?;
+                    for _ in 0..self.count("colours of a face")? {
+                        self.needed()?;
+                    }
+                }
+                b"fc" => {
+                    for _ in 0..self.count("colours of a face")? {
+                        self.needed()?;
+                    }
+                }
+                other => {
+                    let found = format!("{:?}", String::from_utf8_lossy(other));
+                    return Err(Fault::new(line, found, "f, h, mu, mc or fc of a face"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// `componentList 2 "vtx[0]" "vtx[6:7]"`: ranges, and whether there was a list.
+    fn components(&mut self, kind: &str, line: usize) -> Result<(Vec<[u32; 2]>, bool), Fault> {
+        let mut ranges = Vec::new();
+        let mut any = false;
+        while let Some(token) = self.lexer.argument()? {
+            let Token::Text(text) = token else { continue };
+            any = true;
+            let wrong = || Fault::new(line, format!("the component {text:?}"), format!("{kind}[0] or {kind}[0:7]"));
+            let inner = text.strip_prefix(kind).and_then(|t| t.strip_prefix('[')).and_then(|t| t.strip_suffix(']'));
+            let inner = inner.ok_or_else(wrong)?;
+            if inner == "*" {
+                ranges.push([0, u32::MAX]);
+                continue;
+            }
+            let (from, to) = inner.split_once(':').unwrap_or((inner, inner));
+            let index = |s: &str| s.parse::<u32>().ok().filter(|i| u64::from(*i) <= LARGEST_INDEX);
+            let (from, to) = (index(from).ok_or_else(wrong)?, index(to).ok_or_else(wrong)?);
+            if to < from {
+                return Err(wrong());
+            }
+            ranges.push([from, to]);
+        }
+        Ok((ranges, any))
+    }
+
+    fn fill_blend_shape(
+        &mut self,
+        shape: &mut BlendShapeData,
+        attribute: &Attribute<'_>,
+        line: usize,
+    ) -> Result<(), Fault> {
+        match attribute.key().as_str() {
+            "w" => {
+                let Some((from, _)) = attribute.last().1 else { return Ok(()) };
+                let mut index = from;
+                while let Some(weight) = self.number()? {
+                    shape.weights.insert(index, weight);
+                    index = index.saturating_add(1);
+                }
+            }
+            "it.itg.iti.ipt" => {
+                let key = (attribute.index(0), attribute.index(1), attribute.index(2));
+                let item = shape.items.entry(key).or_default();
+                item.line = line;
+                let Some(_count) = self.number()? else { return Ok(()) };
+                item.offsets.clear();
+                // A pointArray has four numbers a point and no unit: Maya's own, the centimetre.
+                while let Some(offset) = self.next_triple()? {
+                    self.needed()?;
+                    item.offsets.push(offset.map(|c| (c * 0.01) as f32));
+                }
+            }
+            "it.itg.iti.ict" => {
+                let key = (attribute.index(0), attribute.index(1), attribute.index(2));
+                let (points, _) = self.components("vtx", line)?;
+                shape.items.entry(key).or_default().points = points;
+            }
+            "ibig.ibi.ibtn" => {
+                if let Some(name) = self.text()? {
+                    shape.item_names.insert((attribute.index(0), attribute.index(1)), name);
+                }
+            }
+            "aal" => {
+                while let (Some(alias), Some(of)) = (self.text()?, self.text()?) {
+                    let index = of
+                        .strip_prefix("weight[")
+                        .or_else(|| of.strip_prefix("w["))
+                        .and_then(|t| t.strip_suffix(']'))
+                        .and_then(|t| t.parse().ok());
+                    if let Some(index) = index {
+                        shape.aliases.insert(index, alias);
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn fill_curve(&mut self, curve: &mut CurveData, attribute: &Attribute<'_>) -> Result<(), Fault> {
+        let from = attribute.last().1.map(|r| r.0);
+        let key = attribute.key();
+        match (key.as_str(), from) {
+            ("ktv", Some(from)) => {
+                let mut index = from;
+                while let Some(time) = self.number()? {
+                    curve.keys.insert(index, [time, self.needed()?]);
+                    index = index.saturating_add(1);
+                }
+            }
+            ("kit" | "kot", Some(from)) => {
+                let types = if key == "kit" { &mut curve.in_types } else { &mut curve.out_types };
+                let mut index = from;
+                while let Some(kind) = self.number()? {
+                    types.insert(index, kind as u32);
+                    index = index.saturating_add(1);
+                }
+            }
+            ("kix" | "kiy" | "kox" | "koy", Some(from)) => {
+                let values = match key.as_str() {
+                    "kix" => &mut curve.in_x,
+                    "kiy" => &mut curve.in_y,
+                    "kox" => &mut curve.out_x,
+                    _ => &mut curve.out_y,
+                };
+                let mut index = from;
+                while let Some(value) = self.number()? {
+                    values.insert(index, value);
+                    index = index.saturating_add(1);
+                }
+            }
+            ("tan", None) => curve.default_tangent = self.count("tangent type")?,
+            ("wgt", None) => curve.weighted = self.flag_on()?,
+            ("pre", None) => curve.pre_infinity = self.count("infinity")?,
+            ("pst", None) => curve.post_infinity = self.count("infinity")?,
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+fn whole(value: f64, line: usize) -> Result<u32, Fault> {
+    if value >= 0.0 && value <= LARGEST_INDEX as f64 && value.fract() == 0.0 {
+        return Ok(value as u32);
+    }
+    Err(Fault::new(line, value.to_string(), "a whole number of 0 or more"))
+}
+
+/// A finite number. Whole numbers and short decimals, nearly all of a scene, take the quick way: digits as an integer
+/// below 2^53 divided by a power of ten up to 10^22 round exactly once (W. D. Clinger 1990).
+fn number(word: &[u8]) -> Option<f64> {
+    const POWERS: [f64; 23] = [
+        1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
+        1e19, 1e20, 1e21, 1e22,
+    ];
+    let (negative, digits) = match word.split_first() {
+        Some((b'-', rest)) => (true, rest),
+        _ => (false, word),
+    };
+    if !digits.is_empty() && digits.len() <= 16 {
+        let mut mantissa = 0_u64;
+        let mut point = None;
+        let plain = digits.iter().enumerate().all(|(i, b)| match b {
+            b'0'..=b'9' => {
+                mantissa = mantissa * 10 + u64::from(b - b'0');
+                true
+            }
+            b'.' if point.is_none() && digits.len() > 1 => {
+                point = Some(i);
+                true
+            }
+            _ => false,
+        });
+        if plain && mantissa < 1 << 53 {
+            let decimals = point.map_or(0, |p| digits.len() - 1 - p);
+            let value = mantissa as f64 / POWERS[decimals];
+            return Some(if negative { -value } else { value });
+        }
+    }
+    let text = std::str::from_utf8(word).ok()?;
+    // Words such as "inf" and "nan" are numbers to Rust and to Maya ("nan" stands in broken scenes).
+    text.parse::<f64>().ok().filter(|n| n.is_finite())
+}
+
+/// Metres in a unit of length.
+fn metres(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "mm" | "millimeter" => 0.001,
+        "cm" | "centimeter" => 0.01,
+        "m" | "meter" => 1.0,
+        "km" | "kilometer" => 1000.0,
+        "in" | "inch" => 0.0254,
+        "ft" | "foot" => 0.3048,
+        "yd" | "yard" => 0.9144,
+        "mi" | "mile" => 1609.344,
+        _ => return None,
+    })
+}
+
+/// Frames a second of a unit of time.
+pub(crate) fn fps(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "game" => 15.0,
+        "film" => 24.0,
+        "pal" => 25.0,
+        "ntsc" => 30.0,
+        "show" => 48.0,
+        "palf" => 50.0,
+        "ntscf" => 60.0,
+        "sec" => 1.0,
+        "min" => 1.0 / 60.0,
+        "hour" => 1.0 / 3600.0,
+        "millisec" => 1000.0,
+        "23.976fps" => 24_000.0 / 1001.0,
+        "29.97fps" | "29.97df" => 30_000.0 / 1001.0,
+        "47.952fps" => 48_000.0 / 1001.0,
+        "59.94fps" => 60_000.0 / 1001.0,
+        _ => unit.strip_suffix("fps")?.parse().ok().filter(|f| *f > 0.0 && *f <= 100_000.0)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_those_of_the_standard_library() {
+        for text in [
+            "0", "-0", "1", "-1.5", "0.1", "123456789.123456", "9007199254740991", "1e-7", "-2.5E+3", "1.4901161193847656e-08",
+            "0.24537032842636108", "-37.538352729610985", ".5", "5.", "00012.50",
+        ] {
+            assert_eq!(number(text.as_bytes()), Some(text.parse::<f64>().unwrap()), "{text}");
+        }
+        for text in ["", "-", ".", "nan", "inf", "1.2.3", "0x10", "--1", "1e999", "abc"] {
+            assert_eq!(number(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn faults_name_the_line() {
+        for (text, line, found) in [
+            ("FOR4", 1, "binary"),
+            ("", 1, "no statement"),
+            ("hello world;\n", 1, "no statement of a Maya scene"),
+            ("currentUnit -l\n parsec;", 2, "parsec"),
+            ("createNode mesh -n \"a\" -p \"gone\";", 1, "the parent"),
+            ("createNode mesh -n \"a\";\n\tsetAttr \".vt[0:1]\" 0 0 0 1 1;", 2, "end of the statement"),
+            ("createNode mesh -n \"a\";\n\tsetAttr \".vt[0:1]\" 0 0\n wide;", 3, "wide"),
+            ("createNode mesh -n \"a\";\n\tsetAttr \".vt[5:6]\" 0 0 0;", 2, ".vt[5:..] after 0"),
+            ("createNode mesh -n \"a\";\n\tsetAttr \".vt[5\" 0 0 0;", 2, "attribute"),
+            ("createNode mesh -n \"a\";\n\tsetAttr \".fc[0]\" -type \"polyFaces\"\n g 3 0 1 2;", 3, "\"g\""),
+            ("createNode mesh -n \"a\";\n\tsetAttr \".ed[0]\" 0 -1 0;", 2, "-1"),
+            ("createNode blendShape -n \"b\";\nsetAttr \".it[0].itg[0].iti[6000].ict\" -type \"componentList\" 1 \"e[0]\";", 2, "e[0]"),
+        ] {
+            let fault = parse(text.as_bytes()).unwrap_err();
+            assert!(fault.found.contains(found), "{text:?}: {fault:?}");
+            assert_eq!(fault.line, line, "{text:?}: {fault:?}");
+        }
+    }
+
+    #[test]
+    fn what_a_scene_requires_is_named() {
+        let scene = parse(b"requires maya \"2024\";\nrequires -nodeType \"x\" \"mtoa\" \"5.3\";\nrequires \"faceware\" \"1\";\nfile -r -ns \"a\" -typ \"mayaAscii\" \"C:/a.ma\";").unwrap();
+        assert_eq!(scene.notes.len(), 2, "{:?}", scene.notes);
+        assert!(scene.notes[0].contains("faceware 1") && scene.notes[1].contains("C:/a.ma"));
+    }
+}

@@ -1,0 +1,180 @@
+//! Heads and sequences to scenes.
+//!
+//! ```text
+//! rubor_head (transform: head motion, order zxy, attribute ruborFacialAppearance)
+//!   rubor_head_mesh (mesh) <-- rubor_shapes (blendShape: a target a shape, in-between items) <-- ...Orig (mesh)
+//! animCurves --> weights, translation, rotation
+//! one shading group a part; skin: file texture, aiStandardSurface with subsurface, aiOslShader for the facial colour
+//! ```
+//!
+//! Positions, offsets, texture coordinates, weights and key times come back bit for bit. Eases that no cubic says
+//! (`smoother`, `easeInOut`) and sequences with expressions or states are sampled at every frame.
+
+mod animation;
+pub mod material;
+mod mesh;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use image::RgbImage;
+use rubor_rig::expression::{Inbetween, Rig};
+use rubor_rig::head::Head;
+use rubor_rig::timeline::Sequence;
+
+use crate::appearance::Appearance;
+use crate::ascii::lexer::quoted;
+use crate::error::WriteError;
+use crate::plain_name;
+
+/// A performance to write with the head.
+#[derive(Clone, Copy, Debug)]
+pub struct Performance<'a> {
+    /// Expressions and states of the sequence are looked up here.
+    pub rig: &'a Rig,
+    /// What happens.
+    pub sequence: &'a Sequence,
+}
+
+/// What to write beside the geometry.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// sRGB colour of the neutral skin in the head's texture space, for the viewport.
+    pub base_color: Option<RgbImage>,
+    /// Shapes that are in-betweens of others.
+    pub inbetweens: Vec<Inbetween>,
+}
+
+/// A scene and the files beside it.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// The `.ma` file.
+    pub text: String,
+    /// Name and content of textures and shader.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// What had to be changed.
+    pub notes: Vec<String>,
+}
+
+/// Writes a scene and the files beside it, each under a temporary name first, the scene last. Returns notes.
+///
+/// # Errors
+/// As [`to_scene`], and if a file cannot be written.
+pub fn write(
+    head: &Head,
+    performance: Option<Performance<'_>>,
+    options: &Options,
+    path: &Path,
+) -> Result<Vec<String>, WriteError> {
+    let stem = path.file_stem().map(|s| plain_name(&s.to_string_lossy())).unwrap_or_default();
+    let scene = to_scene(head, performance, options, &stem)?;
+    let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+    for (name, bytes) in &scene.files {
+        commit(&folder.join(name), bytes)?;
+    }
+    commit(path, scene.text.as_bytes())?;
+    Ok(scene.notes)
+}
+
+fn commit(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let partial = path.with_file_name(format!(".partial-{name}"));
+    std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path)).map_err(|source| {
+        // Nothing to do when the partial file cannot be removed either: the first error says why.
+        let _ = std::fs::remove_file(&partial);
+        WriteError::Write { path: path.to_owned(), source }
+    })
+}
+
+/// A scene as text. `stem` begins the names of the files beside it.
+///
+/// # Errors
+/// A head that breaks a rule, a map that cannot be encoded, a sequence that does not fit the rig or the head.
+pub fn to_scene(
+    head: &Head,
+    performance: Option<Performance<'_>>,
+    options: &Options,
+    stem: &str,
+) -> Result<Scene, WriteError> {
+    head.validate()?;
+    let encode = |(what, reason)| WriteError::Encode { what, reason };
+    let mut scene = Scene::default();
+    let (appearance, files) = Appearance::of(head, stem).map_err(encode)?;
+    scene.files = files;
+    let baked = performance.is_some_and(|p| animation::needs_bake(head, p));
+    // Baked weights already hold the shares of in-betweens: then each is a target of its own.
+    let inbetweens = if baked { &[][..] } else { &options.inbetweens[..] };
+    let targets = mesh::Targets::new(head, inbetweens, &mut scene.notes);
+    let animation = match performance {
+        Some(performance) => Some(animation::Animation::new(head, performance, baked, &mut scene.notes)?),
+        None => None,
+    };
+    let fps = performance.map_or(24.0, |p| p.sequence.fps);
+    let (unit, unit_fps) = animation::time_unit(fps, &mut scene.notes);
+
+    let out = &mut scene.text;
+    let name = format!("{stem}.ma");
+    line(out, &format!("//Maya ASCII 2022 scene\n//Name: {name}\n//Codeset: UTF-8"));
+    line(out, "requires maya \"2022\";\nrequires \"mtoa\" \"5.0.0\";");
+    line(out, &format!("currentUnit -l centimeter -a degree -t {unit};"));
+    line(out, "fileInfo \"application\" \"maya\";\nfileInfo \"product\" \"rubor\";");
+    line(out, "createNode transform -n \"rubor_head\";");
+    line(out, "\taddAttr -ci true -sn \"rfa\" -ln \"ruborFacialAppearance\" -dt \"string\";");
+    // Yaw times pitch times roll: z acts first, then x, then y.
+    line(out, "\tsetAttr \".ro\" 2;");
+    if let Some(animation) = &animation {
+        animation.write_pose(out);
+    }
+    let json = serde_json::to_string(&appearance)
+        .map_err(|e| WriteError::Encode { what: "appearance".into(), reason: e.to_string() })?;
+    line(out, &format!("\tsetAttr \".rfa\" -type \"string\" {};", quoted(&json)));
+    mesh::write(out, head);
+    let weights = animation.as_ref().map(|a| a.rest_weights(&targets)).unwrap_or_default();
+    targets.write(out, head, &weights);
+    let colour = material::Colour::new(head, stem, options, &mut scene.files)?;
+    material::write(out, head, stem, &colour);
+    if let Some(animation) = &animation {
+        animation.write(out, &targets, unit_fps, colour.has_shader());
+    }
+    mesh::connect(out, head);
+    Ok(scene)
+}
+
+fn line(out: &mut String, text: &str) {
+    out.push_str(text);
+    out.push('\n');
+}
+
+/// A length in centimetres with nine digits: enough to give the same f32 of metres back.
+fn centimetres(metres: f32) -> String {
+    digits(f64::from(metres) * 100.0)
+}
+
+/// The shortest decimal within nine significant digits.
+fn digits(value: f64) -> String {
+    let rounded: f64 = format!("{value:.8e}").parse().unwrap_or(value);
+    let mut text = String::new();
+    let exponent = rounded.abs().log10();
+    let written = if rounded == 0.0 || (-5.0..15.0).contains(&exponent) {
+        write!(text, "{rounded}")
+    } else {
+        write!(text, "{rounded:e}")
+    };
+    // Writing to a text cannot fail.
+    debug_assert!(written.is_ok());
+    text
+}
+
+/// Writes values in lines of about a hundred characters.
+fn values(out: &mut String, values: impl Iterator<Item = String>) {
+    let mut width = 0;
+    for value in values {
+        if width > 100 {
+            out.push_str("\n\t\t");
+            width = 0;
+        }
+        out.push(' ');
+        out.push_str(&value);
+        width += value.len() + 1;
+    }
+}
