@@ -4,7 +4,7 @@ use glam::{Mat4, Vec3};
 use rubor_assets::{export, import};
 use rubor_renderer::{
     Camera, ColorTable, Gpu, HeadInstance, HeadOnGpu, RenderError, Renderer, ScatterMethod, Scene, Settings,
-    antialias,
+    TransmitMethod, antialias,
 };
 use rubor_rig::deform;
 use rubor_rig::evaluate::Evaluator;

@@ -225,7 +225,11 @@ fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f
     surface.scattering = 0.0;
     switch corners.w {
         case SKIN: { skin(&surface, uv, duv_dx, duv_dy, tangent, bitangent); }
-        case EYE: { eye(&surface, pixel, uv, duv_dx, duv_dy, tangent, bitangent, to_viewer); }
+        case EYE: {
+            let clip = view.clip_from_world * vec4f(surface.position, 1.0);
+            let pixel = (clip.xy / clip.w * vec2f(0.5, -0.5) + 0.5) * vec2f(view.size) + view.jitter;
+            eye(&surface, pixel, uv, duv_dx, duv_dy, tangent, bitangent, to_viewer);
+        }
         case TEETH: {
             teeth(&surface, uv, tangent, bitangent);
         }
