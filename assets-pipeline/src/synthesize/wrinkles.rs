@@ -149,7 +149,7 @@ impl Wrinkles {
                 height -= (0.25 + 0.35 * unit(hash(h as i32, 1, 1, 5))) * t * t;
             }
         });
-        area * (height + 0.12 * noise(p.extend(9.0), 7.0, self.seed ^ 0xc42))
+        area * (0.7 * height + 0.12 * noise(p.extend(9.0), 7.0, self.seed ^ 0xc42))
     }
 }
 

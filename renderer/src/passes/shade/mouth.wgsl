@@ -49,5 +49,5 @@ fn teeth(surface: ptr<function, Surface>, uv: vec2f, tangent: vec3f, bitangent: 
     let slope = select(0.0, 1.0, abs(x) < 1.0) * side * (0.55 * pow(abs(x), 3.0) * sign(x)) * (1.0 - 0.5 * gum);
     let fall = select(-1.0, 1.0, upper) * 0.35 * smoothstep(0.6, 1.0, height_mm / max(gum_line, 1.0)) * (1.0 - gum);
     (*surface).normal = normalize((*surface).normal + slope * tangent + fall * bitangent);
-    (*surface).occlusion *= (*surface).occlusion;
+    (*surface).occlusion = max((*surface).occlusion, mix(0.34, 0.03, smoothstep(8.0, 38.0, s)));
 }
