@@ -78,7 +78,7 @@ impl Chromophores {
             + 0.06 * r.upper_lip
             - 0.10 * r.neck
             + 0.05 * r.ear
-            - 0.15 * r.lips
+            - 0.05 * r.lips
             - 0.5 * r.inner;
         let mut fraction = self.melanin * (uneven + regional + 0.10 * cavity).exp();
         let spots = self.freckle_weight(place, r);
