@@ -25,8 +25,13 @@ pub(crate) fn reduce(frame: &RgbImage) -> RgbImage {
 
 /// The page of reduced frames of one size.
 pub(crate) fn page(frames: &[RgbImage]) -> RgbImage {
+    page_of(frames, COLUMNS)
+}
+
+/// Pictures of one size in rows of up to `columns`.
+pub(crate) fn page_of(frames: &[RgbImage], columns: u32) -> RgbImage {
     let (w, h) = frames.first().map_or((1, 1), RgbImage::dimensions);
-    let columns = COLUMNS.min(frames.len() as u32).max(1);
+    let columns = columns.min(frames.len() as u32).max(1);
     let rows = (frames.len() as u32).div_ceil(columns).max(1);
     let mut page =
         RgbImage::from_pixel(columns * (w + GAP) + GAP, rows * (h + GAP) + GAP, image::Rgb([24, 24, 26]));

@@ -168,6 +168,21 @@ fn makehuman(arguments: &Makehuman) -> Outcome {
     finish(import::makehuman::import(&options)?, character.skin(), &arguments.common)
 }
 
+/// Makes the head of a character with smaller maps than one that is worked with.
+pub(crate) fn character(character: &import::makehuman::Character, data: &Path, output: &Path) -> Outcome {
+    let mut options = character.head();
+    data.clone_into(&mut options.data);
+    let common = Common {
+        output: Some(output.to_owned()),
+        subdivide: None,
+        maps: 1024,
+        seed: None,
+        melanin: None,
+        small: true,
+    };
+    finish(import::makehuman::import(&options)?, character.skin(), &common)
+}
+
 /// Adds maps where there are none and writes the head.
 fn finish(mut head: Head, mut options: synthesize::Options, common: &Common) -> Outcome {
     let Some(path) = &common.output else { return Err(Failure::input("expected --output FILE.glb")) };

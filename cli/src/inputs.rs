@@ -5,6 +5,7 @@ use std::path::Path;
 use rubor_assets::import;
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
+use rubor_rig::lights::{LIGHT_RIGS, light_rig};
 use rubor_rig::timeline::Sequence;
 
 use crate::failure::{Failure, Outcome};
@@ -68,6 +69,19 @@ pub(crate) fn sequence(path: Option<&Path>) -> Outcome<Sequence> {
         }
         None => Ok(Sequence::demo()?),
     }
+}
+
+/// A built-in light rig, or the sequence of a file for its lights.
+pub(crate) fn lights(name: &str) -> Outcome<Sequence> {
+    if let Some(rig) = light_rig(name) {
+        return Ok(rig?);
+    }
+    let path = Path::new(name);
+    if path.is_file() {
+        return Ok(Sequence::load(path)?);
+    }
+    let names = LIGHT_RIGS.map(|r| r.0).join(", ");
+    Err(Failure::input(format!("--lights: found {name:?}, expected {names}, or a sequence file")))
 }
 
 fn require_file(path: &Path, expected: &str) -> Outcome {

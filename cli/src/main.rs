@@ -13,6 +13,7 @@ mod contact_sheet;
 mod demo;
 mod failure;
 mod filter;
+mod gallery;
 mod import;
 mod inputs;
 mod maps;
@@ -40,6 +41,8 @@ enum Command {
     Demo(demo::Arguments),
     /// Render a sequence to frames, a contact sheet, a video and an animated head
     Render(render::Arguments),
+    /// Draw a page of views, expressions, lights and characters
+    Gallery(gallery::Arguments),
     /// Make a head from other files
     Import(import::Arguments),
     /// Make the maps of a head: hemoglobin, chromophores, normals, transfer
@@ -56,6 +59,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Demo(a) => demo::run(&a),
         Command::Render(a) => render::run(&a),
+        Command::Gallery(a) => gallery::run(&a),
         Command::Import(a) => import::run(&a),
         Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
         Command::Filter(a) => filter::run(&a),

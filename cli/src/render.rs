@@ -16,6 +16,9 @@ pub(crate) struct Arguments {
     /// Sequence (.json) [default: the demo]
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
+    /// Light instead of the sequence's: three-point, window, backlit-ear, low-key, or a sequence file to take it from
+    #[arg(long, value_name = "NAME|FILE")]
+    lights: Option<String>,
     #[command(flatten)]
     job: sequence_job::Arguments,
 }
@@ -27,10 +30,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         arguments.head.iter().map(|path| inputs::head(Some(path))).collect::<Outcome<_>>()?
     };
     let of_head = heads.first().and_then(|h| h.rig.clone());
-    let job = sequence_job::Job {
-        rig: inputs::rig(arguments.rig.as_deref(), of_head)?,
-        sequence: inputs::sequence(arguments.sequence.as_deref())?,
-        heads,
-    };
+    let mut sequence = inputs::sequence(arguments.sequence.as_deref())?;
+    if let Some(lights) = &arguments.lights {
+        sequence.relight(inputs::lights(lights)?);
+    }
+    let job = sequence_job::Job { rig: inputs::rig(arguments.rig.as_deref(), of_head)?, sequence, heads };
     sequence_job::run(job, &arguments.job)
 }

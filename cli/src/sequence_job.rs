@@ -30,7 +30,7 @@ use crate::video::Video;
 use crate::{contact_sheet, output, video};
 
 /// What `render` and `demo` have in common.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 #[group(skip)]
 pub(crate) struct Arguments {
     /// Folder for the results; made if missing
@@ -287,7 +287,7 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
 }
 
 /// Frames are numbered from 1.
-fn frame_path(folder: &Path, frame: u32) -> PathBuf {
+pub(crate) fn frame_path(folder: &Path, frame: u32) -> PathBuf {
     folder.join(format!("frame.{:04}.png", frame + 1))
 }
 

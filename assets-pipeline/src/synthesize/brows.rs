@@ -78,7 +78,7 @@ impl Hairs {
         let height = above_hairline(plan(place))
             + 1.5 * noise(place, 15.0, self.seed ^ 9)
             + 1.2 * noise(place, 2.2, self.seed ^ 10);
-        let scalp = self.scalp * smoothstep(-4.0, 10.0, height) * (1.0 - r.ear);
+        let scalp = self.scalp * smoothstep(-4.0, 10.0, height) * (1.0 - smoothstep(0.9, 1.0, r.ear));
         if scalp > 0.01 {
             clear *= 1.0 - self.cropped_strokes(place, scalp);
         }
@@ -99,7 +99,7 @@ impl Hairs {
         let coarse = noise(squeezed(5.0), 0.9, self.seed ^ 14);
         let tufts = noise(place, 6.0, self.seed ^ 15);
         let strokes = smoothstep(-1.0, 0.9, fine + 0.5 * coarse + 0.2 * tufts + 3.4 * (density - 0.55));
-        (0.45 * density * density + 0.52 * strokes * smoothstep(0.0, 0.4, density)).min(0.97)
+        (0.66 * density * density + 0.33 * strokes * smoothstep(0.0, 0.5, density)).min(0.97)
     }
 
     /// Cut hairs as dots over a tint.

@@ -78,7 +78,7 @@ impl Chromophores {
             + 0.06 * r.upper_lip
             - 0.10 * r.neck
             + 0.05 * r.ear
-            - 0.15 * r.lips
+            - 0.05 * r.lips
             - 0.5 * r.inner;
         let mut fraction = self.melanin * (uneven + regional + 0.10 * cavity).exp();
         let spots = self.freckle_weight(place, r);
@@ -159,7 +159,7 @@ impl Chromophores {
             - 0.12 * r.neck
             - 0.10 * r.scalp;
         let drift = 0.06 * self.noise(place, 32.0, 21) + 0.07 * self.noise(place, 13.0, 22);
-        let red = 1.62 * r.lips + 1.2 * r.inner * (1.0 - r.lips) + 0.10 * r.lip_border;
+        let red = 1.42 * r.lips + 1.2 * r.inner * (1.0 - r.lips) + 0.10 * r.lip_border;
         self.hemoglobin * (relative * (1.0 - r.lips) + drift * (1.0 - 0.6 * r.lips) + red).exp()
     }
 

@@ -32,7 +32,7 @@ struct State {
 const STATES: [State; 9] = [
     State {
         name: "joy",
-        strength: 1.4,
+        strength: 1.05,
         everywhere: 0.0,
         // The cheek is lifted against the bone; lips and the fold's rim are stretched thin.
         change: |r| {

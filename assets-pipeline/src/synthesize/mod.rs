@@ -94,7 +94,7 @@ impl Default for Options {
             brows: 1.0,
             stubble: 0.0,
             scalp_hair: 0.85,
-            hair_melanin: 0.44,
+            hair_melanin: 0.47,
             grey_hair: 0.0,
         }
     }
@@ -258,12 +258,12 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     })
 }
 
-/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and dark brown (0.5). Grey hair
+/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and black-brown (0.5). Grey hair
 /// is a mix of hairs with pigment and of white ones.
 fn hair_color_linear(melanin: f32, grey: f32) -> [f32; 3] {
-    let white = [0.42, 0.41, 0.39];
+    let white = [0.27, 0.265, 0.255];
     let pigmented =
-        [(0.80, 6.2), (0.72, 7.0), (0.60, 7.8)].map(|(root, k): (f32, f32)| root * (-k * melanin).exp());
+        [(0.80, 8.0), (0.72, 8.8), (0.60, 9.6)].map(|(root, k): (f32, f32)| root * (-k * melanin).exp());
     std::array::from_fn(|i| pigmented[i] + grey * (white[i] - pigmented[i]))
 }
 

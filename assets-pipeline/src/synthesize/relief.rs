@@ -167,9 +167,9 @@ impl Relief {
             (r.under_eye, -16.0, 5.0, 1.3, 0.016, 23),
             (r.forehead * (1.0 - r.scalp), 2.0, 12.0, 2.2, 0.012, 24),
             // Neck: rings and a crossing net.
-            (r.neck, 0.0, 70.0, 15.0, 0.22, 25),
-            (r.neck, 24.0, 7.0, 2.0, 0.030, 26),
-            (r.neck, -24.0, 7.0, 2.0, 0.030, 27),
+            (r.neck, 0.0, 70.0, 15.0, 0.12, 25),
+            (r.neck, 24.0, 7.0, 2.0, 0.014, 26),
+            (r.neck, -24.0, 7.0, 2.0, 0.014, 27),
         ];
         for (weight, degrees, along, across, height_mm, seed) in fine {
             let strength = weight * dry * self.held(0.6 * across);

@@ -149,7 +149,7 @@ impl Wrinkles {
                 height -= (0.25 + 0.35 * unit(hash(h as i32, 1, 1, 5))) * t * t;
             }
         });
-        area * (height + 0.12 * noise(p.extend(9.0), 7.0, self.seed ^ 0xc42))
+        area * (0.7 * height + 0.12 * noise(p.extend(9.0), 7.0, self.seed ^ 0xc42))
     }
 }
 
@@ -319,7 +319,7 @@ fn nasolabial(pen: &mut Pen, side: f32) {
     // The cheek rolls over the fold; the lip side stays flat. Downwards along the line, the cheek of the left side
     // is on the left.
     let roll = if side > 0.0 { [0.22, 0.04] } else { [0.04, 0.22] };
-    pen.draw(&knots, 1.6, 2.6, roll);
+    pen.draw(&knots, 1.25, 2.6, roll);
     // It is deepest at the wing of the nose and runs out below the mouth.
     if let Some(fold) = pen.grooves.last_mut() {
         fold.taper = [0.12, 0.45];

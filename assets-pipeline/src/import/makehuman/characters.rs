@@ -63,7 +63,7 @@ const DEFAULT: Character = Character {
     brows: 1.0,
     stubble: 0.25,
     scalp_hair: 0.95,
-    hair_melanin: 0.44,
+    hair_melanin: 0.47,
     grey_hair: 0.0,
 };
 
@@ -111,8 +111,8 @@ pub const CHARACTERS: [Character; 6] = [
         ],
         seed: 33,
         age_years: 35.0,
-        melanin: 0.24,
-        hemoglobin: 0.02,
+        melanin: 0.28,
+        hemoglobin: 0.011,
         freckles: 0.0,
         moles: 4,
         stubble: 0.3,
@@ -185,14 +185,14 @@ pub const CHARACTERS: [Character; 6] = [
         ],
         seed: 81,
         age_years: 46.0,
-        melanin: 0.12,
-        hemoglobin: 0.016,
+        melanin: 0.105,
+        hemoglobin: 0.011,
         freckles: 0.1,
         moles: 8,
         brows: 1.1,
         stubble: 0.0,
         hair_melanin: 0.5,
-        grey_hair: 0.12,
+        grey_hair: 0.03,
         ..DEFAULT
     },
 ];

@@ -15,7 +15,7 @@ use crate::poly::PolyMesh;
 const SCALE: f32 = 10.0;
 /// Biting edge of the upper incisors below the line where the lips meet, metres: at rest the lip shows a little of
 /// them (2 mm in young adults), and the landmark lies on the lower lip's rim, 4 mm above.
-const SHOWN: f32 = 0.006;
+const SHOWN: f32 = 0.0062;
 /// How the tongue is moved, metres.
 const TONGUE: Vec3 = Vec3::new(0.0, -0.007, -0.006);
 /// The lower incisors reach behind the upper ones by this, metres.

@@ -78,7 +78,7 @@ fn overlay_fragment(corner: Corner) -> @location(0) vec4f {
         // Brighter along its middle, as a cylinder is; each hair a little lighter or darker than the next.
         let id = floor(0.5 * corner.uv.x);
         let random = fract(sin(id * 127.1) * 43758.5453);
-        let albedo = select(params.hair.rgb * mix(0.35, 0.95, random), vec3f(0.016, 0.011, 0.008), corner.material == LASH);
+        let albedo = select(params.hair.rgb * mix(0.6, 1.6, random), vec3f(0.016, 0.011, 0.008), corner.material == LASH);
         let round = 0.75 + 0.5 * sqrt(max(1.0 - corner.across * corner.across, 0.0));
         let alpha = clamp(0.96 * corner.opacity, 0.0, 1.0);
         return vec4f(albedo * params.ambient.rgb * round * alpha, alpha);

@@ -57,7 +57,7 @@ fn iris_colors() -> mat2x3f {
     let brown = mat2x3f(vec3f(0.085, 0.036, 0.014), vec3f(0.038, 0.017, 0.008));
     let hazel = mat2x3f(vec3f(0.150, 0.078, 0.028), vec3f(0.075, 0.070, 0.042));
     let blue = mat2x3f(vec3f(0.150, 0.140, 0.100), vec3f(0.085, 0.125, 0.150));
-    let first = smoothstep(0.024, 0.036, hair);
+    let first = smoothstep(0.0100, 0.0122, hair);
     let second = smoothstep(0.05, 0.16, hair);
     return brown * (1.0 - first) + hazel * (first * (1.0 - second)) + blue * (first * second);
 }

@@ -28,7 +28,7 @@ fn teeth(surface: ptr<function, Surface>, uv: vec2f, tangent: vec3f, bitangent: 
     let width = right - left;
     // -1 to 1 across the tooth, towards the back.
     let x = 2.0 * (s - left) / width - 1.0;
-    let crown_mm = select(8.2, 9.8, upper) - select(0.0, 1.4, number == 1u) - select(0.0, 2.0, number > 2u);
+    let crown_mm = select(9.5, 12.0, upper) - select(0.0, 1.4, number == 1u) - select(0.0, 2.0, number > 2u);
     let gum_line = crown_mm - 2.2 * pow(abs(x), 2.6);
     let gum = smoothstep(gum_line - 0.25, gum_line + 0.25, height_mm);
     // Teeth part wider towards the biting edge.
@@ -49,5 +49,5 @@ fn teeth(surface: ptr<function, Surface>, uv: vec2f, tangent: vec3f, bitangent: 
     let slope = select(0.0, 1.0, abs(x) < 1.0) * side * (0.55 * pow(abs(x), 3.0) * sign(x)) * (1.0 - 0.5 * gum);
     let fall = select(-1.0, 1.0, upper) * 0.35 * smoothstep(0.6, 1.0, height_mm / max(gum_line, 1.0)) * (1.0 - gum);
     (*surface).normal = normalize((*surface).normal + slope * tangent + fall * bitangent);
-    (*surface).occlusion *= (*surface).occlusion;
+    (*surface).occlusion = max((*surface).occlusion, mix(0.34, 0.03, smoothstep(8.0, 38.0, s)));
 }

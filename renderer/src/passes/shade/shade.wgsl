@@ -369,7 +369,7 @@ fn add_light(
         let half_vector = to_light + to_viewer;
         let h = normalize(half_vector);
         let brdf = highlight(dot(surface.normal, h), surface.roughness, lit.spread) * schlick(surface.f0, dot(h, to_viewer))
-            / max(dot(half_vector, half_vector), 0.05);
+            / max(dot(half_vector, half_vector), 0.3);
         *specular += irradiance * surface.specular * brdf * cos_light;
     }
 }
