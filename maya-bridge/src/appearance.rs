@@ -79,8 +79,12 @@ impl Appearance {
         let mut files = Vec::new();
         let maps = &head.maps;
         let mut add = |role: &str, name: &str, wrinkle_map: u32, map: &Map| {
-            let file = format!("{stem}_{role}{}.png", if files.is_empty() { String::new() } else { format!("_{}", files.len()) });
-            let (bytes, offset, scale) = encode(map).map_err(|reason| (format!("map {role} {name}"), reason))?;
+            let file = format!(
+                "{stem}_{role}{}.png",
+                if files.is_empty() { String::new() } else { format!("_{}", files.len()) }
+            );
+            let (bytes, offset, scale) =
+                encode(map).map_err(|reason| (format!("map {role} {name}"), reason))?;
             files.push((file.clone(), bytes));
             let entry = MapEntry { role: role.into(), name: name.into(), wrinkle_map, file, offset, scale };
             appearance.maps.push(entry);

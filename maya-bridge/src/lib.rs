@@ -34,8 +34,7 @@ pub const SKIN_OSL: &str = include_str!("../osl/rubor_skin.osl");
 
 /// A name that Maya accepts for nodes and aliases: letters, digits and `_`, not starting with a digit.
 pub(crate) fn plain_name(name: &str) -> String {
-    let mut out: String =
-        name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    let mut out: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if out.is_empty() || out.starts_with(|c: char| c.is_ascii_digit()) {
         out.insert(0, '_');
     }

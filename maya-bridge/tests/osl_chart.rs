@@ -104,9 +104,11 @@ fn the_shader_agrees_with_the_renderer_within_a_step_of_255() {
     }
     let lookup = SkinModel::new(&ChromophoreModel::default()).bake(128, 128);
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/osl_chart.py");
-    for (weights, zones, global) in
-        [([0.0, 0.0, 0.0], [0.0, 0.0], 1.0), ([0.5, 0.2, 0.1], [0.8, 0.6], 1.27), ([0.0, 1.0, 0.0], [1.0, 1.0], 0.81)]
-    {
+    for (weights, zones, global) in [
+        ([0.0, 0.0, 0.0], [0.0, 0.0], 1.0),
+        ([0.5, 0.2, 0.1], [0.8, 0.6], 1.27),
+        ([0.0, 1.0, 0.0], [1.0, 1.0], 0.81),
+    ] {
         let mut parameters = parameters(&scene.text);
         assert!(parameters.len() > 30, "{}", parameters.len());
         for (i, w) in weights.iter().enumerate() {
@@ -148,7 +150,8 @@ fn the_shader_agrees_with_the_renderer_within_a_step_of_255() {
                 slope += weight * Vec2::from_slice(&wrinkles.values[2 * i..2 * i + 2]);
             }
             let normal = Vec3::new(slope.x, slope.y, 1.0).normalize();
-            worst_normal = worst_normal.max((Vec3::from(rendered("outNormal", i)) - normal).abs().max_element());
+            worst_normal =
+                worst_normal.max((Vec3::from(rendered("outNormal", i)) - normal).abs().max_element());
         }
         eprintln!("weights {weights:?}: colour {:.4}/255, normal {worst_normal:.5}", 255.0 * worst);
         assert!(worst <= 1.0 / 255.0, "weights {weights:?}: {} of 255", 255.0 * worst);

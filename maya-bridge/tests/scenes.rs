@@ -7,7 +7,8 @@ use rubor_maya::read::{self, Imported};
 use rubor_maya::write::{self, Performance};
 use rubor_rig::expression::{Inbetween, Rig};
 use rubor_rig::head::{
-    BlendShape, Distribution, Head, Material, Mesh, Part, Provenance, ProvenanceKind, SkinMaps, Vertex, WrinkleZone,
+    BlendShape, Distribution, Head, Material, Mesh, Part, Provenance, ProvenanceKind, SkinMaps, Vertex,
+    WrinkleZone,
 };
 use rubor_rig::map::Map;
 use rubor_rig::timeline::{Ease, Key, Sequence, Track};
@@ -71,7 +72,10 @@ fn head() -> Head {
     let mut shape = |name: &str, step: usize| BlendShape {
         name: name.into(),
         points: (0..N * N).step_by(step).collect(),
-        offsets: (0..N * N).step_by(step).map(|_| 0.01 * Vec3::new(noise.signed(), noise.signed(), 1e-6 * noise.signed())).collect(),
+        offsets: (0..N * N)
+            .step_by(step)
+            .map(|_| 0.01 * Vec3::new(noise.signed(), noise.signed(), 1e-6 * noise.signed()))
+            .collect(),
     };
     let shapes = vec![
         shape("jawOpen", 1),
@@ -124,8 +128,19 @@ fn sequence() -> Sequence {
     let mut sequence = Sequence::still(24.0, 3.0);
     let third = 1.0 / 3.0;
     sequence.shapes = [
-        ("jawOpen".to_owned(), keys(&[(0.0, 0.1, Ease::Linear), (third, 0.7, Ease::Step), (1.0, 0.3, Ease::Smooth), (2.04, 1.25, Ease::Linear)])),
-        ("eyeBlink_L".to_owned(), keys(&[(0.25, 0.0, Ease::EaseIn), (0.3, 1.0, Ease::EaseOut), (0.45, 0.123_456_79, Ease::Linear)])),
+        (
+            "jawOpen".to_owned(),
+            keys(&[
+                (0.0, 0.1, Ease::Linear),
+                (third, 0.7, Ease::Step),
+                (1.0, 0.3, Ease::Smooth),
+                (2.04, 1.25, Ease::Linear),
+            ]),
+        ),
+        (
+            "eyeBlink_L".to_owned(),
+            keys(&[(0.25, 0.0, Ease::EaseIn), (0.3, 1.0, Ease::EaseOut), (0.45, 0.123_456_79, Ease::Linear)]),
+        ),
         ("mouth smile-left".to_owned(), Track::Constant(0.37)),
     ]
     .into();
@@ -133,8 +148,10 @@ fn sequence() -> Sequence {
     sequence.head.pitch_degrees = Track::Constant(4.7);
     sequence.head.roll_degrees = keys(&[(0.5, 1.1, Ease::EaseIn), (2.5, -7.3, Ease::Linear)]);
     let at = |t: f64, v: [f32; 3]| Key { t, v, ease: Ease::Smooth };
-    sequence.head.translation =
-        Track::Keys(vec![at(0.0, [0.01, 0.02, 0.03]), Key { ease: Ease::Linear, ..at(2.9, [0.013, -0.021, 0.0377]) }]);
+    sequence.head.translation = Track::Keys(vec![
+        at(0.0, [0.01, 0.02, 0.03]),
+        Key { ease: Ease::Linear, ..at(2.9, [0.013, -0.021, 0.0377]) },
+    ]);
     sequence
 }
 
@@ -166,9 +183,13 @@ fn a_head_and_its_performance_come_back_exactly() {
     assert_eq!(back.mesh.triangles, head.mesh.triangles);
     assert_eq!(back.mesh.parts, head.mesh.parts);
     assert_eq!(back.mesh.occlusion, head.mesh.occlusion);
-    assert_eq!((&back.name, &back.landmarks, &back.provenance), (&head.name, &head.landmarks, &head.provenance));
+    assert_eq!(
+        (&back.name, &back.landmarks, &back.provenance),
+        (&head.name, &head.landmarks, &head.provenance)
+    );
     for shape in &head.shapes {
-        let found = back.shapes.iter().find(|s| s.name == shape.name).unwrap_or_else(|| panic!("{}", shape.name));
+        let found =
+            back.shapes.iter().find(|s| s.name == shape.name).unwrap_or_else(|| panic!("{}", shape.name));
         assert_eq!(found, shape);
     }
     assert_eq!(back.shapes.len(), head.shapes.len());
@@ -220,8 +241,13 @@ fn expressions_are_baked_with_the_colour_of_the_skin() {
         r#"{ "fps": 25, "duration": 1, "expressions": {"joy": [{"t": 0, "v": 0, "ease": "smoother"}, {"t": 0.96, "v": 1}]} }"#,
     )
     .unwrap();
-    let scene =
-        write::to_scene(&head, Some(Performance { rig: &rig, sequence: &sequence }), &write::Options::default(), "t").unwrap();
+    let scene = write::to_scene(
+        &head,
+        Some(Performance { rig: &rig, sequence: &sequence }),
+        &write::Options::default(),
+        "t",
+    )
+    .unwrap();
     let imported = import(&scene.text);
     let played = imported.sequence.unwrap();
     for frame in 0..25 {
@@ -230,7 +256,11 @@ fn expressions_are_baked_with_the_colour_of_the_skin() {
         assert!((played.shapes["jawOpen"].at(t) - expected).abs() < 1e-6);
     }
     for name in ["distribution_weight_0", "zone_weight_0"] {
-        assert!(scene.text.contains(&format!("connectAttr \"rubor_skin_{name}.o\" \"rubor_skin_color.param_{name}\"")));
+        assert!(
+            scene
+                .text
+                .contains(&format!("connectAttr \"rubor_skin_{name}.o\" \"rubor_skin_color.param_{name}\""))
+        );
     }
     assert!(scene.files.iter().any(|(name, _)| name == "rubor_skin.osl"));
     // Every name that a connection speaks of exists.
@@ -314,7 +344,8 @@ fn import_part(bytes: &[u8], mesh: &str) -> Imported {
 #[test]
 fn a_cube_that_becomes_a_sphere() {
     let Some(bytes) = shared("CubeToSphereAnim.ma") else { return };
-    let imported = read::from_bytes(&bytes, Path::new("CubeToSphereAnim.ma"), &read::Options::default()).unwrap();
+    let imported =
+        read::from_bytes(&bytes, Path::new("CubeToSphereAnim.ma"), &read::Options::default()).unwrap();
     let head = &imported.head;
     assert_eq!((head.mesh.points.len(), head.mesh.triangles.len()), (98, 192));
     assert_eq!(head.shapes.len(), 1);
@@ -360,7 +391,11 @@ fn the_blend_shape_scene_of_maya_usd() {
     // Other deformers in the stack are named, the blend shape is read.
     let imported = import_part(&bytes, "|cube_extra_deformer_in_stack|group9|base");
     assert!(!imported.head.shapes.is_empty());
-    assert!(imported.notes.iter().any(|n| n.contains("squash") || n.contains("nonLinear")), "{:?}", imported.notes);
+    assert!(
+        imported.notes.iter().any(|n| n.contains("squash") || n.contains("nonLinear")),
+        "{:?}",
+        imported.notes
+    );
 
     // Empty targets stay as shapes that do nothing.
     let imported = import_part(&bytes, "|cube_empty_blendshape_targets|base");
@@ -369,9 +404,13 @@ fn the_blend_shape_scene_of_maya_usd() {
 
     // The whole scene at once is a valid head too.
     read::from_bytes(&bytes, Path::new("scene.ma"), &read::Options::default()).unwrap();
-    let error = read::from_bytes(&bytes, Path::new("scene.ma"), &read::Options { mesh: Some("nobody".into()) });
+    let error =
+        read::from_bytes(&bytes, Path::new("scene.ma"), &read::Options { mesh: Some("nobody".into()) });
     let message = error.unwrap_err().to_string();
-    assert!(message.contains("no mesh whose path contains \"nobody\"") && message.contains("baseShape"), "{message}");
+    assert!(
+        message.contains("no mesh whose path contains \"nobody\"") && message.contains("baseShape"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -402,9 +441,13 @@ createNode mesh -n "origShape" -p "face";
         ),
     ];
     for (text, expected) in cases {
-        let error = read::from_bytes(text.as_bytes(), Path::new("wrong.ma"), &read::Options::default()).unwrap_err();
+        let error =
+            read::from_bytes(text.as_bytes(), Path::new("wrong.ma"), &read::Options::default()).unwrap_err();
         let message = error.to_string();
-        assert!(message.contains(expected) && message.starts_with("wrong.ma:"), "{message:?} lacks {expected:?}");
+        assert!(
+            message.contains(expected) && message.starts_with("wrong.ma:"),
+            "{message:?} lacks {expected:?}"
+        );
     }
 }
 
@@ -414,7 +457,8 @@ fn corrupted_scenes_never_panic() {
     let rig = Rig::default();
     let sequence = sequence();
     let performance = Performance { rig: &rig, sequence: &sequence };
-    let mut scene = write::to_scene(&head, Some(performance), &write::Options::default(), "t").unwrap().text.into_bytes();
+    let mut scene =
+        write::to_scene(&head, Some(performance), &write::Options::default(), "t").unwrap().text.into_bytes();
     // Without the shader's text, so that corruption hits what matters.
     let shader = scene.windows(6).position(|w| w == b".code\"").unwrap();
     let end = shader + scene[shader..].windows(3).position(|w| w == b"\";\n").unwrap();

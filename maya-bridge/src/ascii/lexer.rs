@@ -198,7 +198,8 @@ mod tests {
 
     #[test]
     fn words_texts_comments_and_lines() {
-        let text = "//a \"comment\"\nsetAttr -s 2 \".vt[0:1]\" 1.5 -2e-3;/* more\n; */ x {\"a b\",\"c\\\"d\\n\"};";
+        let text =
+            "//a \"comment\"\nsetAttr -s 2 \".vt[0:1]\" 1.5 -2e-3;/* more\n; */ x {\"a b\",\"c\\\"d\\n\"};";
         assert_eq!(
             words(text),
             ["setAttr", "-s", "2", "<.vt[0:1]>", "1.5", "-2e-3", ";", "x", "<a b>", "<c\"d\n>", ";"]

@@ -1,15 +1,25 @@
 //! Statements to a [`Scene`]: one pass, values go straight to where they stay.
 
 use super::lexer::{Lexer, Token};
-use super::scene::{BlendShapeData, CurveData, Data, MeshData, Node, NodeId, Plug, PolyCube, Scene, Transform};
+use super::scene::{
+    BlendShapeData, CurveData, Data, MeshData, Node, NodeId, Plug, PolyCube, Scene, Transform,
+};
 use crate::error::Fault;
 
 /// Largest index of an array attribute: a scene that names a larger one is broken, and would fill the memory.
 const LARGEST_INDEX: u64 = 50_000_000;
 
 /// Plugins whose nodes carry nothing that a head needs.
-const HARMLESS_PLUGINS: [&str; 8] =
-    ["stereoCamera", "mtoa", "mayaUsdPlugin", "fbxmaya", "Turtle", "renderSetup", "modelingToolkit", "ATFPlugin"];
+const HARMLESS_PLUGINS: [&str; 8] = [
+    "stereoCamera",
+    "mtoa",
+    "mayaUsdPlugin",
+    "fbxmaya",
+    "Turtle",
+    "renderSetup",
+    "modelingToolkit",
+    "ATFPlugin",
+];
 
 /// Reads a scene.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Scene, Fault> {
@@ -17,7 +27,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Scene, Fault> {
     if bytes.starts_with(b"FOR4") || bytes.starts_with(b"FOR8") {
         return Err(Fault::new(1, "a Maya binary scene (.mb)", "Maya ASCII: save the scene as .ma"));
     }
-    let mut parser = Parser { lexer: Lexer::new(bytes), scene: Scene::default(), current: None, links: Vec::new() };
+    let mut parser =
+        Parser { lexer: Lexer::new(bytes), scene: Scene::default(), current: None, links: Vec::new() };
     let mut statements = 0;
     let mut known = 0;
     while let Some(token) = parser.lexer.next()? {
@@ -35,9 +46,10 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Scene, Fault> {
             b"currentUnit" => parser.current_unit()?,
             b"requires" => parser.requires()?,
             b"file" => parser.reference()?,
-            b"rename" | b"addAttr" | b"fileInfo" | b"lockNode" | b"parent" | b"relationship" | b"dataStructure"
-            | b"applyMetadata" | b"editMetadata" | b"namespace" | b"workspace" | b"evaluator" | b"disconnectAttr"
-            | b"scriptJob" | b"source" | b"python" | b"warning" | b"undo" => parser.lexer.skip_statement()?,
+            b"rename" | b"addAttr" | b"fileInfo" | b"lockNode" | b"parent" | b"relationship"
+            | b"dataStructure" | b"applyMetadata" | b"editMetadata" | b"namespace" | b"workspace"
+            | b"evaluator" | b"disconnectAttr" | b"scriptJob" | b"source" | b"python" | b"warning"
+            | b"undo" => parser.lexer.skip_statement()?,
             _ => {
                 known -= 1;
                 parser.lexer.skip_statement()?;
@@ -69,7 +81,8 @@ struct Attribute<'t> {
 
 impl<'t> Attribute<'t> {
     fn parse(text: &'t str, line: usize) -> Result<Self, Fault> {
-        let wrong = || Fault::new(line, format!("attribute {text:?}"), "a name with indices such as .vt[0:7]");
+        let wrong =
+            || Fault::new(line, format!("attribute {text:?}"), "a name with indices such as .vt[0:7]");
         let mut steps = Vec::new();
         for part in text.split('.').filter(|p| !p.is_empty()) {
             let Some((name, rest)) = part.split_once('[') else {
@@ -283,7 +296,9 @@ impl<'a> Parser<'a> {
         let mut last = None;
         while let Some(token) = self.lexer.argument()? {
             last = match token {
-                Token::Word(word) if !word.starts_with(b"-") => Some(String::from_utf8_lossy(word).into_owned()),
+                Token::Word(word) if !word.starts_with(b"-") => {
+                    Some(String::from_utf8_lossy(word).into_owned())
+                }
                 Token::Text(text) => Some(text.into_owned()),
                 _ => last,
             };
@@ -300,7 +315,8 @@ impl<'a> Parser<'a> {
             let wrong = |expected: &str| Fault::new(line, format!("the unit {value:?}"), expected);
             match flag {
                 b"-l" | b"-linear" => {
-                    self.scene.metres = metres(&value).ok_or_else(|| wrong("mm, cm, m, km, in, ft, yd or mi"))?;
+                    self.scene.metres =
+                        metres(&value).ok_or_else(|| wrong("mm, cm, m, km, in, ft, yd or mi"))?;
                 }
                 b"-a" | b"-angle" => {
                     self.scene.radians = match value.as_str() {
@@ -364,7 +380,11 @@ impl<'a> Parser<'a> {
     fn connect(&mut self) -> Result<(), Fault> {
         let line = self.lexer.line();
         let (Some(from), Some(to)) = (self.text()?, self.text()?) else {
-            return Err(Fault::new(line, "connectAttr with less than two attributes", "a source and a destination"));
+            return Err(Fault::new(
+                line,
+                "connectAttr with less than two attributes",
+                "a source and a destination",
+            ));
         };
         self.links.push((from.into(), to.into()));
         self.lexer.skip_statement()
@@ -484,7 +504,12 @@ impl<'a> Parser<'a> {
         Ok(!matches!(self.lexer.argument()?, Some(Token::Word(b"no" | b"off" | b"false" | b"0"))))
     }
 
-    fn fill_mesh(&mut self, mesh: &mut MeshData, attribute: &Attribute<'_>, line: usize) -> Result<(), Fault> {
+    fn fill_mesh(
+        &mut self,
+        mesh: &mut MeshData,
+        attribute: &Attribute<'_>,
+        line: usize,
+    ) -> Result<(), Fault> {
         let (_, range) = attribute.last();
         let metres = self.scene.metres;
         let in_metres = |v: [f64; 3]| v.map(|c| (c * metres) as f32);
@@ -549,7 +574,11 @@ impl<'a> Parser<'a> {
         if from as usize == have {
             return Ok(());
         }
-        Err(Fault::new(line, format!("{name}[{from}:..] after {have} elements"), format!("{name}[{have}:..]")))
+        Err(Fault::new(
+            line,
+            format!("{name}[{from}:..] after {have} elements"),
+            format!("{name}[{have}:..]"),
+        ))
     }
 
     fn faces(&mut self, mesh: &mut MeshData) -> Result<(), Fault> {
@@ -621,8 +650,10 @@ impl<'a> Parser<'a> {
         while let Some(token) = self.lexer.argument()? {
             let Token::Text(text) = token else { continue };
             any = true;
-            let wrong = || Fault::new(line, format!("the component {text:?}"), format!("{kind}[0] or {kind}[0:7]"));
-            let inner = text.strip_prefix(kind).and_then(|t| t.strip_prefix('[')).and_then(|t| t.strip_suffix(']'));
+            let wrong =
+                || Fault::new(line, format!("the component {text:?}"), format!("{kind}[0] or {kind}[0:7]"));
+            let inner =
+                text.strip_prefix(kind).and_then(|t| t.strip_prefix('[')).and_then(|t| t.strip_suffix(']'));
             let inner = inner.ok_or_else(wrong)?;
             if inner == "*" {
                 ranges.push([0, u32::MAX]);
@@ -746,8 +777,8 @@ fn whole(value: f64, line: usize) -> Result<u32, Fault> {
 /// below 2^53 divided by a power of ten up to 10^22 round exactly once (W. D. Clinger 1990).
 fn number(word: &[u8]) -> Option<f64> {
     const POWERS: [f64; 23] = [
-        1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
-        1e19, 1e20, 1e21, 1e22,
+        1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17,
+        1e18, 1e19, 1e20, 1e21, 1e22,
     ];
     let (negative, digits) = match word.split_first() {
         Some((b'-', rest)) => (true, rest),
@@ -822,8 +853,21 @@ mod tests {
     #[test]
     fn numbers_are_those_of_the_standard_library() {
         for text in [
-            "0", "-0", "1", "-1.5", "0.1", "123456789.123456", "9007199254740991", "1e-7", "-2.5E+3", "1.4901161193847656e-08",
-            "0.24537032842636108", "-37.538352729610985", ".5", "5.", "00012.50",
+            "0",
+            "-0",
+            "1",
+            "-1.5",
+            "0.1",
+            "123456789.123456",
+            "9007199254740991",
+            "1e-7",
+            "-2.5E+3",
+            "1.4901161193847656e-08",
+            "0.24537032842636108",
+            "-37.538352729610985",
+            ".5",
+            "5.",
+            "00012.50",
         ] {
             assert_eq!(number(text.as_bytes()), Some(text.parse::<f64>().unwrap()), "{text}");
         }
@@ -846,7 +890,11 @@ mod tests {
             ("createNode mesh -n \"a\";\n\tsetAttr \".vt[5\" 0 0 0;", 2, "attribute"),
             ("createNode mesh -n \"a\";\n\tsetAttr \".fc[0]\" -type \"polyFaces\"\n g 3 0 1 2;", 3, "\"g\""),
             ("createNode mesh -n \"a\";\n\tsetAttr \".ed[0]\" 0 -1 0;", 2, "-1"),
-            ("createNode blendShape -n \"b\";\nsetAttr \".it[0].itg[0].iti[6000].ict\" -type \"componentList\" 1 \"e[0]\";", 2, "e[0]"),
+            (
+                "createNode blendShape -n \"b\";\nsetAttr \".it[0].itg[0].iti[6000].ict\" -type \"componentList\" 1 \"e[0]\";",
+                2,
+                "e[0]",
+            ),
         ] {
             let fault = parse(text.as_bytes()).unwrap_err();
             assert!(fault.found.contains(found), "{text:?}: {fault:?}");

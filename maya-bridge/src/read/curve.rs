@@ -48,11 +48,12 @@ impl Curve {
     pub(super) fn new(data: &CurveData, fps: f64, unit: f64) -> Option<Self> {
         let mut keys: Vec<Knot> = Vec::with_capacity(data.keys.len());
         for (index, [time, value]) in &data.keys {
-            let tangent = |types: &std::collections::BTreeMap<u32, u32>, x: Option<&f64>, y: Option<&f64>| Tangent {
-                kind: types.get(index).copied().unwrap_or(data.default_tangent),
-                x: x.copied().unwrap_or(1.0),
-                y: y.copied().unwrap_or(0.0),
-            };
+            let tangent =
+                |types: &std::collections::BTreeMap<u32, u32>, x: Option<&f64>, y: Option<&f64>| Tangent {
+                    kind: types.get(index).copied().unwrap_or(data.default_tangent),
+                    x: x.copied().unwrap_or(1.0),
+                    y: y.copied().unwrap_or(0.0),
+                };
             keys.push(Knot {
                 time_s: time / fps,
                 value: value * unit,
@@ -130,8 +131,11 @@ impl Curve {
         } else {
             plain(self.slope(i, true))
         };
-        let inward =
-            if stored(to.inward) { [to.inward.x / 3.0, to.inward.y / 3.0] } else { plain(self.slope(i + 1, false)) };
+        let inward = if stored(to.inward) {
+            [to.inward.x / 3.0, to.inward.y / 3.0]
+        } else {
+            plain(self.slope(i + 1, false))
+        };
         // A handle that reaches over the segment would make time run backwards.
         let shorten = |[x, y]: [f64; 2]| {
             let x = x.max(0.0);
@@ -268,7 +272,13 @@ mod tests {
         let c = curve(&keys, AUTO);
         for i in 0..=300 {
             let t = f64::from(i) / 100.0;
-            let (low, high) = if t < 1.0 { (0.0, 1.0) } else if t < 2.0 { (1.0, 3.0) } else { (3.0, 3.0) };
+            let (low, high) = if t < 1.0 {
+                (0.0, 1.0)
+            } else if t < 2.0 {
+                (1.0, 3.0)
+            } else {
+                (3.0, 3.0)
+            };
             assert!((low - 1e-12..=high + 1e-12).contains(&c.at(t)), "{t}: {}", c.at(t));
         }
     }

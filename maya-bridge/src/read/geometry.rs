@@ -133,7 +133,8 @@ fn of_mesh(mesh: &MeshData, path: &str, line: usize) -> Result<Polygons, Fault> 
         let mut face = Vec::with_capacity((*end as usize).saturating_sub(start));
         for corner in start..*end as usize {
             let written = mesh.corners[corner];
-            let (edge, side) = if written < 0 { (-(i64::from(written) + 1), 1) } else { (i64::from(written), 0) };
+            let (edge, side) =
+                if written < 0 { (-(i64::from(written) + 1), 1) } else { (i64::from(written), 0) };
             let fail = |found: String, expected: String| {
                 Fault::new(line, format!("{path}, face {f}: {found}"), expected)
             };

@@ -46,7 +46,15 @@ pub(super) fn build(
         None => None,
     };
 
-    let mut assembly = Assembly { scene, appearance, shapes: Vec::new(), by_name: HashMap::new(), head: Head::default(), inbetweens: Vec::new(), weights: Vec::new() };
+    let mut assembly = Assembly {
+        scene,
+        appearance,
+        shapes: Vec::new(),
+        by_name: HashMap::new(),
+        head: Head::default(),
+        inbetweens: Vec::new(),
+        weights: Vec::new(),
+    };
     assembly.head.name = name.to_owned();
     let mut first_fault = None;
     let mut read = Vec::new();
@@ -282,11 +290,8 @@ impl Assembly<'_> {
             let identity = *place == DAffine3::IDENTITY;
             for (point, offset) in offsets {
                 let offset = Vec3::from(offset);
-                let turned = if identity {
-                    offset
-                } else {
-                    place.transform_vector3(offset.as_dvec3()).as_vec3()
-                };
+                let turned =
+                    if identity { offset } else { place.transform_vector3(offset.as_dvec3()).as_vec3() };
                 self.shapes[index].1.insert(first_point + point, turned);
             }
         }
@@ -335,7 +340,8 @@ impl Assembly<'_> {
                     return Ok(all.filter(|(_, d)| *d != [0.0; 3]).collect());
                 }
                 moved => {
-                    let found = moved.map_or("no points of its own".into(), |m| format!("{} points", m.len()));
+                    let found =
+                        moved.map_or("no points of its own".into(), |m| format!("{} points", m.len()));
                     notes.push(format!(
                         "the live target {} has {found} where the mesh has {count}; the stored offsets are used",
                         scene.path(plug.node)
@@ -361,7 +367,13 @@ impl Assembly<'_> {
         if taken { format!("{}_{alias}", self.scene.nodes[node].name) } else { name }
     }
 
-    fn finish(self, meshes: Vec<NodeId>, carrier: Option<NodeId>, folder: &Path, notes: &mut Vec<String>) -> Built {
+    fn finish(
+        self,
+        meshes: Vec<NodeId>,
+        carrier: Option<NodeId>,
+        folder: &Path,
+        notes: &mut Vec<String>,
+    ) -> Built {
         let mut head = self.head;
         let shape = |(name, offsets): (String, BTreeMap<u32, Vec3>)| {
             let (points, offsets) = offsets.into_iter().unzip();

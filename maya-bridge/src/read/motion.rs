@@ -31,9 +31,10 @@ pub(super) fn sequence(scene: &Scene, built: &Built, notes: &mut Vec<String>) ->
     }
     let movers = movers(scene, built);
     let moving = movers.iter().any(|m| m.channels.iter().flatten().next().is_some());
-    let carried = built.carrier.and_then(|id| scene.transform(id)).is_some_and(|t| {
-        t.translate_cm != [0.0; 3] || t.rotate != [0.0; 3]
-    });
+    let carried = built
+        .carrier
+        .and_then(|id| scene.transform(id))
+        .is_some_and(|t| t.translate_cm != [0.0; 3] || t.rotate != [0.0; 3]);
     if weights.is_empty() && constants.is_empty() && !moving && !carried {
         return None;
     }
@@ -74,7 +75,8 @@ pub(super) fn sequence(scene: &Scene, built: &Built, notes: &mut Vec<String>) ->
         _ => {}
     }
     if baked > 0 {
-        notes.push(format!("{baked} curve segments have no easing like them and were sampled at every frame"));
+        notes
+            .push(format!("{baked} curve segments have no easing like them and were sampled at every frame"));
     }
     match sequence.check() {
         Ok(()) => Some(sequence),

@@ -50,9 +50,12 @@ impl Animation {
         notes: &mut Vec<String>,
     ) -> Result<Self, WriteError> {
         let sequence = performance.sequence;
-        let (evaluator, found) = Evaluator::new(head, performance.rig, sequence).map_err(|e| {
-            WriteError::Content { at: "sequence".into(), found: e.to_string(), expected: "one for this head".into() }
-        })?;
+        let (evaluator, found) =
+            Evaluator::new(head, performance.rig, sequence).map_err(|e| WriteError::Content {
+                at: "sequence".into(),
+                found: e.to_string(),
+                expected: "one for this head".into(),
+            })?;
         notes.extend(found.iter().filter(|_| baked).map(ToString::to_string));
         let motion = &sequence.head;
         let mut animation = Self {
@@ -85,7 +88,8 @@ impl Animation {
 
     fn bake(&mut self, head: &Head, evaluator: &Evaluator) {
         let mut shapes: Vec<Vec<f32>> = vec![Vec::new(); head.shapes.len()];
-        let mut skin: Vec<Vec<f32>> = vec![Vec::new(); head.maps.distributions.len() + head.maps.zones.len() + 1];
+        let mut skin: Vec<Vec<f32>> =
+            vec![Vec::new(); head.maps.distributions.len() + head.maps.zones.len() + 1];
         for frame in 0..self.frame_count {
             let face = evaluator.at(evaluator.frame_time_s(frame)).face;
             shapes.iter_mut().zip(&face.shapes).for_each(|(list, w)| list.push(*w));
@@ -131,7 +135,13 @@ impl Animation {
 
     pub(super) fn write(&self, out: &mut String, targets: &Targets, unit_fps: f64, has_shader: bool) {
         let mut links = Vec::new();
-        let mut curve = |out: &mut String, kind: &str, name: String, to: String, track: &Track<f32>, value: &dyn Fn(f32) -> String, unit: f64| {
+        let mut curve = |out: &mut String,
+                         kind: &str,
+                         name: String,
+                         to: String,
+                         track: &Track<f32>,
+                         value: &dyn Fn(f32) -> String,
+                         unit: f64| {
             if let Track::Keys(keys) = track {
                 write_curve(out, kind, &name, keys, value, unit, unit_fps, self.fps);
                 links.push((name, to));
@@ -271,10 +281,22 @@ fn frame_of(t: f64, fps: f64) -> f64 {
 /// Maya's name for a frame rate, and the rate that it stands for.
 pub(super) fn time_unit(fps: f64, notes: &mut Vec<String>) -> (String, f64) {
     const WHOLE: [u32; 40] = [
-        2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 40, 75, 80, 90, 100, 120, 125, 150, 200, 240, 250, 300, 375, 400, 500, 600, 750,
-        1200, 1500, 2000, 3000, 6000, 24, 25, 30, 48, 50, 60, 15, 1000,
+        2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 40, 75, 80, 90, 100, 120, 125, 150, 200, 240, 250, 300, 375, 400,
+        500, 600, 750, 1200, 1500, 2000, 3000, 6000, 24, 25, 30, 48, 50, 60, 15, 1000,
     ];
-    for name in ["film", "pal", "ntsc", "show", "palf", "ntscf", "game", "23.976fps", "29.97fps", "47.952fps", "59.94fps"] {
+    for name in [
+        "film",
+        "pal",
+        "ntsc",
+        "show",
+        "palf",
+        "ntscf",
+        "game",
+        "23.976fps",
+        "29.97fps",
+        "47.952fps",
+        "59.94fps",
+    ] {
         if let Some(rate) = crate::ascii::parser::fps(name)
             && (rate - fps).abs() < 1e-9 * fps
         {
@@ -284,6 +306,8 @@ pub(super) fn time_unit(fps: f64, notes: &mut Vec<String>) -> (String, f64) {
     if WHOLE.iter().any(|w| f64::from(*w) == fps) {
         return (format!("{fps}fps"), fps);
     }
-    notes.push(format!("Maya has no rate of {fps} frames a second: the scene is at 24, with keys between frames"));
+    notes.push(format!(
+        "Maya has no rate of {fps} frames a second: the scene is at 24, with keys between frames"
+    ));
     ("film".into(), 24.0)
 }

@@ -39,7 +39,8 @@ impl Colour {
         options: &Options,
         files: &mut Vec<(String, Vec<u8>)>,
     ) -> Result<Self, WriteError> {
-        let encode = |e: image::ImageError| WriteError::Encode { what: "texture".into(), reason: e.to_string() };
+        let encode =
+            |e: image::ImageError| WriteError::Encode { what: "texture".into(), reason: e.to_string() };
         let mut colour = Self { base_color: None, parameters: Vec::new() };
         if let Some(image) = &options.base_color {
             let mut png = Vec::new();
@@ -54,7 +55,10 @@ impl Colour {
         let (Some(melanin), Some(hemoglobin)) = (&maps.melanin, &maps.hemoglobin) else { return Ok(colour) };
         let mut add = |role: &str, layers: &[&Map]| -> Result<(), WriteError> {
             let Some(first) = layers.first() else { return Ok(()) };
-            let (low, high) = layers.iter().flat_map(|m| &m.values).fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+            let (low, high) = layers
+                .iter()
+                .flat_map(|m| &m.values)
+                .fold((f32::MAX, f32::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
             let range = if high > low { high - low } else { 1.0 };
             let mut texels: Vec<u8> = Vec::new();
             for map in layers {
@@ -78,7 +82,9 @@ impl Colour {
             Ok(())
         };
         // Layers below each other must be of one size.
-        let same = |layers: &[&Map]| layers.windows(2).all(|w| (w[0].width, w[0].height) == (w[1].width, w[1].height));
+        let same = |layers: &[&Map]| {
+            layers.windows(2).all(|w| (w[0].width, w[0].height) == (w[1].width, w[1].height))
+        };
         add("melanin", &[melanin])?;
         add("hemoglobin", &[hemoglobin])?;
         let mut counts = Vec::new();
@@ -137,7 +143,12 @@ pub fn lookup_map() -> Map {
 pub(super) fn write(out: &mut String, head: &Head, stem: &str, colour: &Colour) {
     for (i, part) in head.mesh.parts.iter().enumerate().filter(|(_, p)| !p.triangles.is_empty()) {
         let group = shading_group(i, &part.name);
-        line(out, &format!("createNode shadingEngine -n \"{group}\";\n\tsetAttr \".ihi\" 0;\n\tsetAttr \".ro\" yes;"));
+        line(
+            out,
+            &format!(
+                "createNode shadingEngine -n \"{group}\";\n\tsetAttr \".ihi\" 0;\n\tsetAttr \".ro\" yes;"
+            ),
+        );
         line(out, &format!("createNode groupId -n \"{group}_id\";\n\tsetAttr \".ihi\" 0;"));
         line(out, &format!("createNode lambert -n \"{group}_viewport\";"));
         let [r, g, b] = plain_colour(part.material);
@@ -164,8 +175,14 @@ pub(super) fn write(out: &mut String, head: &Head, stem: &str, colour: &Colour) 
     line(out, "createNode aiStandardSurface -n \"rubor_skin\";");
     line(out, "\tsetAttr \".base\" 0;\n\tsetAttr \".subsurface\" 1;\n\tsetAttr \".subsurfaceType\" 1;");
     // Mean distances of light in skin, millimetres (E. d'Eon and D. Luebke 2007, mean of the profile), in centimetres.
-    line(out, "\tsetAttr \".subsurfaceRadius\" -type \"float3\" 1.09 0.45 0.34 ;\n\tsetAttr \".subsurfaceScale\" 0.1;");
-    line(out, "\tsetAttr \".specular\" 0.5;\n\tsetAttr \".specularRoughness\" 0.4;\n\tsetAttr \".specularIOR\" 1.4;");
+    line(
+        out,
+        "\tsetAttr \".subsurfaceRadius\" -type \"float3\" 1.09 0.45 0.34 ;\n\tsetAttr \".subsurfaceScale\" 0.1;",
+    );
+    line(
+        out,
+        "\tsetAttr \".specular\" 0.5;\n\tsetAttr \".specularRoughness\" 0.4;\n\tsetAttr \".specularIOR\" 1.4;",
+    );
     if colour.has_shader() {
         line(out, "createNode aiOslShader -n \"rubor_skin_color\";");
         for (name, parameter) in &colour.parameters {

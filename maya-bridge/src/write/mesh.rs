@@ -18,7 +18,10 @@ pub(super) fn write(out: &mut String, head: &Head) {
     line(out, &format!("createNode mesh -n \"{MESH}\" -p \"rubor_head\";"));
     for (i, part) in head.mesh.parts.iter().enumerate().filter(|(_, p)| !p.triangles.is_empty()) {
         let (from, to) = (part.triangles.start, part.triangles.end - 1);
-        line(out, &format!("\tsetAttr \".iog[0].og[{i}].gcl\" -type \"componentList\" 1 \"f[{from}:{to}]\";"));
+        line(
+            out,
+            &format!("\tsetAttr \".iog[0].og[{i}].gcl\" -type \"componentList\" 1 \"f[{from}:{to}]\";"),
+        );
     }
     uv_names(out);
     if head.shapes.is_empty() {
@@ -155,7 +158,10 @@ impl Targets {
             return;
         }
         line(out, "createNode blendShape -n \"rubor_shapes\";");
-        line(out, "\taddAttr -ci true -h true -sn \"aal\" -ln \"attributeAliasList\" -dt \"attributeAlias\";");
+        line(
+            out,
+            "\taddAttr -ci true -h true -sn \"aal\" -ln \"attributeAliasList\" -dt \"attributeAlias\";",
+        );
         let _ = write!(out, "\tsetAttr -s {n} \".w[0:{}]\"", n - 1);
         values(out, (0..n).map(|i| weights.get(i).copied().unwrap_or_default().to_string()));
         line(out, &format!(";\n\tsetAttr -s {n} \".it[0].itg\";"));
@@ -164,7 +170,10 @@ impl Targets {
             for (item_index, shape) in &target.between {
                 item(out, i, *item_index, &head.shapes[*shape]);
                 let name = quoted(&head.shapes[*shape].name);
-                line(out, &format!("\tsetAttr \".ibig[{i}].ibi[{item_index}].ibtn\" -type \"string\" {name};"));
+                line(
+                    out,
+                    &format!("\tsetAttr \".ibig[{i}].ibi[{item_index}].ibtn\" -type \"string\" {name};"),
+                );
             }
         }
         let aliases: Vec<String> =

@@ -172,13 +172,7 @@ fn weight_curve(
     Curve { values: resample(times, &values, fps, count, rate), limited }
 }
 
-fn head_motion(
-    recording: &Recording,
-    retarget: &Retarget,
-    fps: f64,
-    count: usize,
-    rate: f64,
-) -> HeadMotion {
+fn head_motion(recording: &Recording, retarget: &Retarget, fps: f64, count: usize, rate: f64) -> HeadMotion {
     let Some(head) = &recording.head else { return HeadMotion::default() };
     let times = &recording.times_s;
     let track = |angles: &[f32], how: super::HeadAngle| {
@@ -212,7 +206,13 @@ fn unwrapped(angles: &[f32]) -> Vec<f32> {
         .iter()
         .map(|a| {
             if let Some(b) = before {
-                turns += if a - b > PI { -TAU } else if a - b < -PI { TAU } else { 0.0 };
+                turns += if a - b > PI {
+                    -TAU
+                } else if a - b < -PI {
+                    TAU
+                } else {
+                    0.0
+                };
             }
             before = Some(*a);
             a + turns

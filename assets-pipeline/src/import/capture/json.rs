@@ -108,13 +108,7 @@ impl Reader<'_> {
         number.ok_or_else(|| self.wrong(&at(), &value.to_string(), "a finite number"))
     }
 
-    fn columns(
-        &mut self,
-        names: &[Value],
-        field: &str,
-        rows: &[Value],
-        fps: f64,
-    ) -> Result<(), ImportError> {
+    fn columns(&mut self, names: &[Value], field: &str, rows: &[Value], fps: f64) -> Result<(), ImportError> {
         let mut channels = Vec::new();
         for (i, name) in names.iter().enumerate() {
             let Some(name) = name.as_str() else {

@@ -164,8 +164,9 @@ fn set_times(
 ) -> Result<(), ImportError> {
     let all: Vec<Stamp> = stamps.iter().map(|s| s.1).collect();
     let rate = Rate::of(&all, timecode_rate);
-    if let Some((line, Stamp::Frames { frame, .. })) =
-        stamps.iter().find(|(_, s)| matches!(s, Stamp::Frames { frame, .. } if *frame >= f64::from(rate.base)))
+    if let Some((line, Stamp::Frames { frame, .. })) = stamps
+        .iter()
+        .find(|(_, s)| matches!(s, Stamp::Frames { frame, .. } if *frame >= f64::from(rate.base)))
     {
         let at = format!("line {line}, column Timecode");
         let expected = format!("frames below {} (timecode rate)", rate.base);

@@ -106,7 +106,12 @@ pub fn read(path: &Path) -> Result<Recording, ImportError> {
         "json" => json::from_bytes(&bytes, path),
         _ => {
             let found = format!("the extension {extension:?}");
-            Err(ImportError::content(path, "name", found, ".csv (Live Link Face) or .json (MediaPipe, ARKit)"))
+            Err(ImportError::content(
+                path,
+                "name",
+                found,
+                ".csv (Live Link Face) or .json (MediaPipe, ARKit)",
+            ))
         }
     }
 }

@@ -137,8 +137,7 @@ impl<'de> Deserialize<'de> for ShapeTarget {
             }
 
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ShapeTarget, A::Error> {
-                let Scaled { shape, gain, offset } =
-                    Scaled::deserialize(MapAccessDeserializer::new(map))?;
+                let Scaled { shape, gain, offset } = Scaled::deserialize(MapAccessDeserializer::new(map))?;
                 Ok(ShapeTarget { shape, gain, offset })
             }
         }

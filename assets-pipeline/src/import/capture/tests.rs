@@ -122,9 +122,14 @@ fn wrong_tables_are_refused_with_line_and_column() {
         assert!(error.contains(expected) && error.contains("take.csv"), "{error:?} lacks {expected:?}");
     }
     // What a lost face and a stopped recording leave behind is named, not refused.
-    let recording =
-        live(&["Timecode,BlendShapeCount,JawOpen,MouthClose", "0:0:0:0,2,1,0", "0:0:0:1,0", "0:0:0:2,2,1,1", "0:0:0:3,2,0."])
-            .unwrap();
+    let recording = live(&[
+        "Timecode,BlendShapeCount,JawOpen,MouthClose",
+        "0:0:0:0,2,1,0",
+        "0:0:0:1,0",
+        "0:0:0:2,2,1,1",
+        "0:0:0:3,2,0.",
+    ])
+    .unwrap();
     assert_eq!(recording.times_s.len(), 2);
     assert!(recording.notes.iter().any(|n| n.contains("1 rows without a face")));
     assert!(recording.notes.iter().any(|n| n.starts_with("line 5: the last row is cut")));
@@ -265,7 +270,8 @@ fn json_layouts_say_the_same() {
         {"timestamp": 5.0, "blendShapes": {"_neutral": 0.1, "jawOpen": 0.25},
          "transform": [[0.9800666,0,0.1986693,0],[0,1,0,0],[-0.1986693,0,0.9800666,0],[0,0,0,1]]},
         {"timestamp": 5.1, "blendShapes": {"jawOpen": 0.5}}]}"#;
-    let columns = r#"{"exportFps": 10, "facsNames": ["_neutral", "jawOpen"], "weightMat": [[0.1, 0.25], [0.1, 0.5]]}"#;
+    let columns =
+        r#"{"exportFps": 10, "facsNames": ["_neutral", "jawOpen"], "weightMat": [[0.1, 0.25], [0.1, 0.5]]}"#;
     for text in [frames, arkit, columns] {
         let recording = json::from_bytes(text.as_bytes(), Path::new("take.json")).unwrap();
         let jaw = recording.channels.iter().find(|c| c.name == "jawOpen").unwrap();
