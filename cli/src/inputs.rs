@@ -65,7 +65,18 @@ pub(crate) fn sequence(path: Option<&Path>) -> Outcome<Sequence> {
     match path {
         Some(path) => {
             require_file(path, "a sequence (.json)")?;
-            Ok(Sequence::load(path)?)
+            let mut sequence = Sequence::load(path)?;
+            let folder = path.parent().unwrap_or(Path::new(""));
+            if let Some(report) = import::capture::load_into(&mut sequence, folder)? {
+                for note in &report.notes {
+                    eprintln!("note: {}: capture: {note}", path.display());
+                }
+                if !report.unmapped.is_empty() {
+                    let names = report.unmapped.join(", ");
+                    eprintln!("note: {}: capture: no shape is known for {names}", path.display());
+                }
+            }
+            Ok(sequence)
         }
         None => Ok(Sequence::demo()?),
     }

@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod adapters;
+mod capture;
 mod contact_sheet;
 mod demo;
 mod failure;
@@ -17,6 +18,7 @@ mod gallery;
 mod import;
 mod inputs;
 mod maps;
+mod maya;
 mod output;
 mod progress;
 mod render;
@@ -47,6 +49,8 @@ enum Command {
     Import(import::Arguments),
     /// Make the maps of a head: hemoglobin, chromophores, normals, transfer
     Maps(maps::MapsArgs),
+    /// Maya ASCII scenes in and out
+    Maya(maya::Arguments),
     /// Antialias images
     Filter(filter::Arguments),
     /// List the graphics adapters of this machine
@@ -61,6 +65,7 @@ fn main() -> ExitCode {
         Command::Render(a) => render::run(&a),
         Command::Gallery(a) => gallery::run(&a),
         Command::Import(a) => import::run(&a),
+        Command::Maya(a) => maya::run(&a),
         Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
         Command::Filter(a) => filter::run(&a),
         Command::Adapters(a) => adapters::run(&a),

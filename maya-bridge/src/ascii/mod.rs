@@ -3,3 +3,4 @@
 pub(crate) mod lexer;
 pub(crate) mod parser;
 pub(crate) mod scene;
+pub(crate) mod words;

@@ -297,7 +297,7 @@ pub(super) fn time_unit(fps: f64, notes: &mut Vec<String>) -> (String, f64) {
         "47.952fps",
         "59.94fps",
     ] {
-        if let Some(rate) = crate::ascii::parser::fps(name)
+        if let Some(rate) = crate::ascii::words::fps(name)
             && (rate - fps).abs() < 1e-9 * fps
         {
             return (name.into(), fps);

@@ -1,0 +1,138 @@
+//! `rubor maya`: Maya ASCII scenes in and out.
+
+use std::path::{Path, PathBuf};
+
+use clap::Subcommand;
+use rubor_maya::read;
+use rubor_maya::write::{self, Performance};
+use rubor_rig::expression::Rig;
+
+use crate::failure::{Failure, Outcome};
+use crate::import::{Common, finish_with};
+use crate::sequence_job::neutral_color;
+use crate::{inputs, output};
+
+#[derive(clap::Args)]
+#[group(skip)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Make a head, and a sequence of its keys, from a Maya ASCII scene
+    Import(Import),
+    /// Write a head, with a performance if one is given, as a Maya ASCII scene with its textures
+    Export(Export),
+}
+
+#[derive(clap::Args)]
+struct Import {
+    /// Maya ASCII scene (.ma)
+    scene: PathBuf,
+    /// Only meshes whose path contains this, such as |head_grp|
+    #[arg(long, value_name = "PART")]
+    mesh: Option<String>,
+    /// Also write the keyed weights and the motion of the head (.json)
+    #[arg(long, value_name = "FILE")]
+    sequence: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(clap::Args)]
+struct Export {
+    /// A head (.glb or .gltf) [default: the built-in head]
+    #[arg(long, value_name = "FILE")]
+    head: Option<PathBuf>,
+    /// A rig (.json) [default: the head's own]
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
+    /// A sequence (.json) to key
+    #[arg(long, value_name = "FILE")]
+    sequence: Option<PathBuf>,
+    /// The scene to write (.ma); textures and the OSL shader go beside it
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+impl From<rubor_maya::error::ReadError> for Failure {
+    fn from(e: rubor_maya::error::ReadError) -> Self {
+        Self::input(e)
+    }
+}
+
+impl From<rubor_maya::error::WriteError> for Failure {
+    fn from(e: rubor_maya::error::WriteError) -> Self {
+        use rubor_maya::error::WriteError as E;
+        match e {
+            E::Write { .. } | E::Encode { .. } => Self::job(e),
+            E::Content { .. } | E::Head(_) => Self::input(e),
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    match &arguments.action {
+        Action::Import(a) => import(a),
+        Action::Export(a) => export(a),
+    }
+}
+
+fn require_extension(path: &Path, extension: &str) -> Outcome {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension)) {
+        return Ok(());
+    }
+    Err(Failure::input(format!("{}: expected a name that ends in .{extension}", path.display())))
+}
+
+fn import(arguments: &Import) -> Outcome {
+    let options = read::Options { mesh: arguments.mesh.clone() };
+    let imported = read::read(&arguments.scene, &options)?;
+    for note in &imported.notes {
+        eprintln!("note: {}: {note}", arguments.scene.display());
+    }
+    if let Some(path) = &arguments.sequence {
+        require_extension(path, "json")?;
+        let Some(sequence) = &imported.sequence else {
+            let found = format!("{}: found no keys, expected some for --sequence", arguments.scene.display());
+            return Err(Failure::input(found));
+        };
+        output::write(path, &serde_json::to_vec_pretty(sequence).map_err(Failure::job)?)?;
+        println!("{}: {} frames at {} a second", path.display(), sequence.frame_count(), sequence.fps);
+    }
+    let mut rig = Rig::default_rig()?;
+    rig.inbetweens.extend(imported.inbetweens);
+    finish_with(imported.head, &rig, rubor_assets::synthesize::Options::default(), &arguments.common)
+}
+
+fn export(arguments: &Export) -> Outcome {
+    require_extension(&arguments.output, "ma")?;
+    let loaded = inputs::head(arguments.head.as_deref())?;
+    let rig = inputs::rig(arguments.rig.as_deref(), loaded.rig)?;
+    let sequence = match &arguments.sequence {
+        Some(path) => Some(inputs::sequence(Some(path))?),
+        None => None,
+    };
+    let options = write::Options {
+        base_color: neutral_color(&loaded.head, 2048),
+        // Only those of which the head has both ends.
+        inbetweens: (rig.inbetweens.iter())
+            .filter(|i| [&i.shape, &i.target].iter().all(|n| loaded.head.shape_index(n).is_some()))
+            .cloned()
+            .collect(),
+    };
+    let performance = sequence.as_ref().map(|sequence| Performance { rig: &rig, sequence });
+    for note in write::write(&loaded.head, performance, &options, &arguments.output)? {
+        eprintln!("note: {note}");
+    }
+    println!(
+        "{}: {} points, {} targets{}",
+        arguments.output.display(),
+        loaded.head.mesh.points.len(),
+        loaded.head.shapes.len(),
+        sequence.map_or_else(String::new, |s| format!(", {} frames", s.frame_count()))
+    );
+    Ok(())
+}
