@@ -3,7 +3,7 @@
 //! ```text
 //! OBJ set ---------+                                        +--> .glb (one file, any glTF viewer opens it)
 //! glTF / GLB ------+--> import --> Head --> convert --------+
-//! MakeHuman data --+                (occlusion)             +--> animated .glb
+//! MakeHuman data --+                (occlusion, maps)       +--> animated .glb
 //! ```
 //!
 //! ```
@@ -29,6 +29,7 @@ pub mod convert;
 pub mod error;
 pub mod export;
 pub mod facial_appearance;
+pub mod image_io;
 pub mod import;
 pub mod poly;
 pub mod synthesize;

@@ -64,7 +64,9 @@ impl From<rubor_renderer::RenderError> for Failure {
     fn from(e: rubor_renderer::RenderError) -> Self {
         use rubor_renderer::RenderError as E;
         match e {
-            E::UnknownAdapter { .. } | E::Limit { .. } | E::Head(_) | E::Skin(_) => Self::input(e),
+            E::UnknownAdapter { .. } | E::Limit { .. } | E::Head(_) | E::Antialias(_) | E::Skin(_) => {
+                Self::input(e)
+            }
             E::NoAdapter => Self::job(e).hint("`make demo` installs one on Debian and Ubuntu"),
             E::Device { .. } | E::Lost(_) => Self::job(e),
         }

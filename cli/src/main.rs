@@ -12,8 +12,10 @@ mod adapters;
 mod contact_sheet;
 mod demo;
 mod failure;
+mod filter;
 mod import;
 mod inputs;
+mod maps;
 mod output;
 mod progress;
 mod render;
@@ -40,6 +42,10 @@ enum Command {
     Render(render::Arguments),
     /// Make a head from other files
     Import(import::Arguments),
+    /// Make the maps of a head: hemoglobin, chromophores, normals, transfer
+    Maps(maps::MapsArgs),
+    /// Antialias images
+    Filter(filter::Arguments),
     /// List the graphics adapters of this machine
     Adapters(adapters::Arguments),
     /// Print the JSON schema of a rig or a sequence
@@ -51,6 +57,8 @@ fn main() -> ExitCode {
         Command::Demo(a) => demo::run(&a),
         Command::Render(a) => render::run(&a),
         Command::Import(a) => import::run(&a),
+        Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
+        Command::Filter(a) => filter::run(&a),
         Command::Adapters(a) => adapters::run(&a),
         Command::Schema(a) => schema::run(&a),
     };

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
-use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, Settings, TransmitMethod};
+use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, Settings, TransmitMethod, antialias};
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{Head, Material};
@@ -49,15 +49,18 @@ pub(crate) struct Arguments {
     /// Light through thin parts: none or shadow-depth
     #[arg(long, default_value = "shadow-depth", value_name = "METHOD")]
     pub(crate) transmit: TransmitMethod,
-    /// Antialiasing: none, or ssaa:N with N x N samples a pixel
-    #[arg(long, default_value = "ssaa:2", value_parser = parse_antialias, value_name = "METHOD")]
+    /// Antialiasing: none, mlaa, smaa-1x, smaa-s2x, smaa-t2x, smaa-4x, or ssaa:N with N x N samples a pixel
+    #[arg(long, default_value = "smaa-s2x", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
     /// Factor of the light before the tone map
-    #[arg(long, default_value_t = 2.4)]
+    #[arg(long, default_value_t = 1.8)]
     pub(crate) exposure: f32,
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
     #[arg(long, value_name = "NAME")]
     pub(crate) adapter: Option<String>,
+    /// Draw only these frames, such as 1,12-20 (the first is 1); makes no video
+    #[arg(long, value_parser = parse_frames, value_name = "LIST")]
+    pub(crate) frames: Option<FrameList>,
     /// Keep the frames that a stopped run of the same job left
     #[arg(long)]
     pub(crate) resume: bool,
@@ -75,17 +78,39 @@ pub(crate) struct Arguments {
 /// An antialiasing method by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Antialias {
-    None,
+    Filter(antialias::Mode),
     Supersampling(u32),
 }
 
+/// Numbers of frames from 1, ascending, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct FrameList(Vec<u32>);
+
+fn parse_frames(text: &str) -> Result<FrameList, String> {
+    let wrong = || format!("found {text:?}, expected frame numbers from 1 such as 1,12-20");
+    let mut numbers = std::collections::BTreeSet::new();
+    for part in text.split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let first: u32 = first.trim().parse().map_err(|_| wrong())?;
+        let last: u32 = last.trim().parse().map_err(|_| wrong())?;
+        if first == 0 || last < first || last - first > 1_000_000 {
+            return Err(wrong());
+        }
+        numbers.extend(first..=last);
+    }
+    Ok(FrameList(numbers.into_iter().collect()))
+}
+
 fn parse_antialias(text: &str) -> Result<Antialias, String> {
-    if text == "none" {
-        return Ok(Antialias::None);
+    if let Some(mode) = antialias::Mode::ALL.into_iter().find(|mode| mode.name() == text) {
+        return Ok(Antialias::Filter(mode));
     }
     match text.strip_prefix("ssaa:").and_then(|n| n.parse().ok()) {
         Some(n) if (1..=8).contains(&n) => Ok(Antialias::Supersampling(n)),
-        _ => Err(format!("found {text:?}, expected none, or ssaa:N with N from 1 to 8")),
+        _ => {
+            let names = antialias::Mode::ALL.map(antialias::Mode::name).join(", ");
+            Err(format!("found {text:?}, expected {names}, or ssaa:N with N from 1 to 8"))
+        }
     }
 }
 
@@ -122,7 +147,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         evaluators.push(evaluator);
     }
     let Some(first) = evaluators.first() else { return Err(Failure::input("there is no head to draw")) };
-    let frames = first.frame_count();
+    let frames = chosen_frames(first.frame_count(), arguments.frames.as_ref())?;
     let renderer = Renderer::new(Gpu::new(arguments.adapter.as_deref())?)?;
 
     output::folder(&arguments.output)?;
@@ -132,21 +157,26 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     let mut studio = Studio::new(renderer, &heads)?;
 
     let mut sheet = Vec::new();
-    let on_sheet = contact_sheet::choose(frames);
+    let on_sheet = contact_sheet::choose(frames.len() as u32);
     let mut times = PassTimes::default();
     let mut first_frame_s = None;
     let mut drawn = Vec::new();
-    let mut progress = Progress::new("frames", u64::from(frames));
-    for frame in 0..frames {
+    let mut drawn_last = None;
+    let mut progress = Progress::new("frames", frames.len() as u64);
+    for (place, frame) in frames.iter().copied().enumerate() {
         let path = frame_path(&arguments.output, frame);
         let kept = if is_new { None } else { read_frame(&path, size) };
         let picture = match kept {
             Some(picture) => picture,
             None => {
                 let at = Instant::now();
-                let mut shots: Vec<Shot> = evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
-                step_back(&mut shots);
-                let (image, stats) = studio.render(&shots, spacing, &settings)?;
+                if settings.antialias.mode.is_temporal() && frame > 0 && drawn_last != Some(frame - 1) {
+                    // Frames were left out: antialiasing over time needs the one before.
+                    studio.renderer.cut(u64::from(frame) - 1);
+                    studio.render(&shots_of(&evaluators, frame - 1), spacing, &settings)?;
+                }
+                drawn_last = Some(frame);
+                let (image, stats) = studio.render(&shots_of(&evaluators, frame), spacing, &settings)?;
                 let picture = opaque(image);
                 write_png(&path, &picture)?;
                 first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
@@ -155,7 +185,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
                 picture
             }
         };
-        if on_sheet.contains(&frame) {
+        if on_sheet.contains(&(place as u32)) {
             sheet.push(contact_sheet::reduce(&picture));
         }
         progress.step();
@@ -163,7 +193,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     progress.finish();
 
     write_png(&arguments.output.join(SHEET_FILE), &contact_sheet::page(&sheet))?;
-    if !arguments.no_video {
+    if !arguments.no_video && arguments.frames.is_none() {
         let path = arguments.output.join(VIDEO_FILE);
         if let Video::NoEncoder = video::encode(&arguments.output, 1, job.sequence.fps, &path)? {
             eprintln!("note: no video: the program ffmpeg is not on this machine (Debian, Ubuntu: ffmpeg)");
@@ -176,7 +206,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     let stats = json!({
         "adapter": { "name": gpu.name, "backend": format!("{:?}", gpu.backend), "driver": gpu.driver_info },
         "size": size,
-        "frames": frames,
+        "frames": frames.len(),
         "framesDrawn": drawn.len(),
         "scatter": arguments.scatter.to_string(),
         "transmit": arguments.transmit.to_string(),
@@ -192,21 +222,33 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     if arguments.json {
         println!("{text}");
     } else {
-        println!("{frames} frames in {}", arguments.output.display());
+        println!("{} frames in {}", frames.len(), arguments.output.display());
     }
     Ok(())
 }
 
+/// Indices from 0 of the frames to draw.
+fn chosen_frames(count: u32, list: Option<&FrameList>) -> Outcome<Vec<u32>> {
+    let Some(FrameList(numbers)) = list else { return Ok((0..count).collect()) };
+    match numbers.last() {
+        Some(last) if *last > count => Err(Failure::input(format!(
+            "--frames: found {last}, expected at most {count}, the length of the sequence"
+        ))),
+        _ => Ok(numbers.iter().map(|n| n - 1).collect()),
+    }
+}
+
 fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
-    let supersampling = match arguments.antialias {
-        Antialias::None => 1,
-        Antialias::Supersampling(n) => n,
+    let (mode, supersampling) = match arguments.antialias {
+        Antialias::Filter(mode) => (mode, 1),
+        Antialias::Supersampling(n) => (antialias::Mode::None, n),
     };
     Ok(Settings {
         size,
         scatter: arguments.scatter,
         transmit: arguments.transmit,
         profile: Arc::new(Profile::deon_six()),
+        antialias: antialias::Settings::new(mode, antialias::Preset::High),
         supersampling,
         shadow_size: 2048,
         exposure: arguments.exposure,
@@ -270,15 +312,14 @@ fn width(head: &Head) -> f32 {
     head.bounds().map_or(0.0, |(low, high)| high.x - low.x)
 }
 
-/// Several heads side by side are seen from further away.
-fn step_back(shots: &mut [Shot]) {
+/// Shots of all heads at a frame, from the camera of the first; several heads are seen from further away.
+fn shots_of(evaluators: &[Evaluator], frame: u32) -> Vec<Shot> {
+    let mut shots: Vec<Shot> = evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
     let n = shots.len() as f32;
-    if let Some(first) = shots.first_mut()
-        && n > 1.0
-    {
-        let camera = &mut first.camera;
+    if let Some(Shot { camera, .. }) = shots.first_mut() {
         camera.position = camera.target + (camera.position - camera.target) * n;
     }
+    shots
 }
 
 /// Writes the (first) head with its performance as morph weights and node motion.
@@ -362,5 +403,9 @@ mod tests {
     fn methods_are_read_by_name() {
         assert_eq!(parse_antialias("ssaa:4"), Ok(Antialias::Supersampling(4)));
         assert!(parse_antialias("ssaa:0").is_err());
+        assert_eq!(parse_frames("3, 1-2,2"), Ok(FrameList(vec![1, 2, 3])));
+        for wrong in ["", "0", "4-3", "a", "1,,2"] {
+            assert!(parse_frames(wrong).unwrap_err().contains(wrong));
+        }
     }
 }

@@ -14,7 +14,7 @@ use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
 use crate::failure::{Failure, Outcome};
 
 /// Radiance behind the heads: a grey that a face is neither lost nor dazzled before.
-const BACKDROP_LINEAR: Vec3 = Vec3::new(0.035, 0.038, 0.042);
+const BACKDROP_LINEAR: Vec3 = Vec3::new(0.016, 0.018, 0.021);
 /// Side of the skin colour table (see `rubor_rig::skin::chromophores` for its error).
 const COLOR_TABLE_SIDE: u32 = 64;
 /// Radius of a lamp with a place, metres: a soft box of 24 cm.

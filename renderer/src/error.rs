@@ -37,6 +37,9 @@ pub enum RenderError {
     /// The head breaks a rule of [`rubor_rig::head::Head`].
     #[error(transparent)]
     Head(#[from] rubor_rig::error::HeadError),
+    /// Antialiasing settings out of range.
+    #[error(transparent)]
+    Antialias(#[from] crate::passes::antialias::AntialiasError),
     /// The diffusion profile or a kernel of it is out of range.
     #[error(transparent)]
     Skin(#[from] rubor_rig::error::SkinError),

@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
 use crate::head::{GpuVertex, HeadOnGpu};
+use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::{Appearance, Blended};
 use crate::passes::compose::Compose;
 use crate::passes::display::Display;
@@ -19,6 +20,7 @@ use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
 use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded, TransmitMethod, Transmittance};
 use crate::passes::shadow::{LightView, Shadow};
 use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
+use crate::passes::velocity::{Moving, Velocity};
 use crate::passes::visibility::Visibility;
 use crate::scene::{Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
 
@@ -33,6 +35,8 @@ pub struct Settings {
     pub transmit: TransmitMethod,
     /// How far light goes in skin, for every method.
     pub profile: Arc<Profile>,
+    /// Antialiasing of the displayed image.
+    pub antialias: antialias::Settings,
     /// Pixels of the frame on a side of a pixel of the image (1 to 8): `ssaa`.
     pub supersampling: u32,
     /// Texels on a side of a shadow map.
@@ -48,7 +52,7 @@ pub struct Image {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// RGBA, sRGB transfer; alpha is coverage (not premultiplied).
+    /// RGBA, sRGB transfer, opaque.
     pub rgba: Vec<u8>,
 }
 
@@ -81,6 +85,8 @@ pub(crate) struct View {
     pub(crate) jitter: [f32; 2],
     pub(crate) near: f32,
     pub(crate) light_count: u32,
+    pub(crate) shading_jitter: [f32; 2],
+    pub(crate) padding: [f32; 2],
 }
 
 /// Draws scenes. Keeps pipelines, and images of the last size, between frames; nothing else carries over.
@@ -96,50 +102,83 @@ pub struct Renderer {
     compose: Compose,
     overlay: Overlay,
     display: Display,
+    velocity: Velocity,
+    antialias: Option<Antialias>,
     transmittance: Option<(Arc<Profile>, Transmittance)>,
     targets: Option<Targets>,
     instances: Vec<Instance>,
     timer: PassTimer,
     /// Whether the last frame's diffuse light is in `scattered` (or unscattered in `irradiance`).
     is_scattered: bool,
+    /// What antialiasing over time remembers: the only thing that one frame leaves to the next.
+    past: Past,
+}
+
+/// The previous frame.
+#[derive(Default)]
+struct Past {
+    history: Option<History>,
+    clip_from_world: Option<Mat4>,
+    frames: u64,
 }
 
 /// Images between passes.
 struct Targets {
     size: [u32; 2],
-    ids: wgpu::TextureView,
-    depth: wgpu::TextureView,
+    samples: Vec<SampleTargets>,
+    velocity: Option<wgpu::TextureView>,
+    image: wgpu::Texture,
     irradiance: wgpu::TextureView,
     albedo: wgpu::TextureView,
     direct: wgpu::TextureView,
     scratch: wgpu::TextureView,
     scattered: wgpu::TextureView,
     hdr: wgpu::TextureView,
-    image: wgpu::Texture,
     shadows: wgpu::Texture,
+}
+
+/// Images of one sample of each pixel.
+struct SampleTargets {
+    ids: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    /// Encoded for display, before antialiasing.
+    displayed: wgpu::TextureView,
 }
 
 /// Buffers of one head of a scene.
 struct Instance {
     positions: wgpu::Buffer,
+    previous_positions: wgpu::Buffer,
     frames: wgpu::Buffer,
     blended: Blended,
 }
 
 impl Targets {
-    fn new(gpu: &Gpu, size: [u32; 2], image_size: [u32; 2], shadow_size: u32, shadow_layers: u32) -> Self {
+    fn new(gpu: &Gpu, settings: &Settings, shadow_layers: u32) -> Self {
         use wgpu::TextureFormat::{Depth32Float, R32Uint, Rgba8Unorm, Rgba16Float};
         use wgpu::TextureUsages as Use;
-        let view = |label, format, usage| {
+        let size = settings.frame_size();
+        let storage = Use::STORAGE_BINDING;
+        let view = |label, size, format, usage| {
             gpu.target(label, size, format, usage | Use::TEXTURE_BINDING | Use::COPY_SRC)
                 .create_view(&Default::default())
         };
-        let storage = Use::STORAGE_BINDING;
+        let light = |label| view(label, size, Rgba16Float, storage);
+        let mode = settings.antialias.mode;
+        let samples = mode
+            .subsamples(0)
+            .iter()
+            .map(|_| SampleTargets {
+                ids: view("ids", size, R32Uint, Use::RENDER_ATTACHMENT),
+                depth: view("depth", size, Depth32Float, Use::RENDER_ATTACHMENT),
+                displayed: view("displayed", settings.size, Rgba8Unorm, storage),
+            })
+            .collect();
         let shadows = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("shadows"),
             size: wgpu::Extent3d {
-                width: shadow_size,
-                height: shadow_size,
+                width: settings.shadow_size,
+                height: settings.shadow_size,
                 depth_or_array_layers: shadow_layers.max(1),
             },
             mip_level_count: 1,
@@ -151,28 +190,30 @@ impl Targets {
         });
         Self {
             size,
-            ids: view("ids", R32Uint, Use::RENDER_ATTACHMENT),
-            depth: view("depth", Depth32Float, Use::RENDER_ATTACHMENT),
-            irradiance: view("irradiance", Rgba16Float, storage),
-            albedo: view("albedo", Rgba16Float, storage),
-            direct: view("direct", Rgba16Float, storage),
-            scratch: view("scratch", Rgba16Float, storage),
-            scattered: view("scattered", Rgba16Float, storage),
-            hdr: view("hdr", Rgba16Float, storage | Use::RENDER_ATTACHMENT),
+            samples,
+            velocity: mode.is_temporal().then(|| light("velocity")),
             image: gpu.target(
                 "image",
-                image_size,
+                settings.size,
                 Rgba8Unorm,
                 storage | Use::COPY_SRC | Use::TEXTURE_BINDING,
             ),
+            irradiance: light("irradiance"),
+            albedo: light("albedo"),
+            direct: light("direct"),
+            scratch: light("scratch"),
+            scattered: light("scattered"),
+            hdr: view("hdr", size, Rgba16Float, storage | Use::RENDER_ATTACHMENT),
             shadows,
         }
     }
 
     fn matches(&self, settings: &Settings, shadow_layers: u32) -> bool {
-        let image = [self.image.width(), self.image.height()];
-        self.size == settings.size.map(|n| n * settings.supersampling)
-            && image == settings.size
+        let mode = settings.antialias.mode;
+        self.size == settings.frame_size()
+            && [self.image.width(), self.image.height()] == settings.size
+            && self.samples.len() == mode.subsamples(0).len()
+            && self.velocity.is_some() == mode.is_temporal()
             && self.shadows.width() == settings.shadow_size
             && self.shadows.depth_or_array_layers() >= shadow_layers
     }
@@ -180,9 +221,18 @@ impl Targets {
     fn bytes(&self) -> u64 {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let image = u64::from(self.image.width()) * u64::from(self.image.height()) * 4;
+        let samples = self.samples.len() as u64;
         let s = self.shadows.size();
         let shadow = u64::from(s.width) * u64::from(s.height) * u64::from(s.depth_or_array_layers) * 4;
-        pixels * (4 + 4 + 6 * 8) + image + shadow
+        let lights = 6 + u64::from(self.velocity.is_some());
+        pixels * (samples * 8 + lights * 8) + image * (1 + samples) + shadow
+    }
+}
+
+impl Settings {
+    /// Pixels that the passes before display draw.
+    fn frame_size(&self) -> [u32; 2] {
+        self.size.map(|n| n * self.supersampling)
     }
 }
 
@@ -203,11 +253,14 @@ impl Renderer {
             compose: Compose::new(&gpu),
             overlay: Overlay::new(&gpu),
             display: Display::new(&gpu),
+            velocity: Velocity::new(&gpu),
+            antialias: None,
             transmittance: None,
             targets: None,
             instances: Vec::new(),
             timer: PassTimer::new(&gpu),
             is_scattered: false,
+            past: Past::default(),
             gpu,
         };
         renderer.gpu.check()?;
@@ -219,7 +272,13 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Draws a scene and waits for the picture.
+    /// Forgets the previous frame: call it at a cut, so that antialiasing over time mixes nothing into the next one.
+    /// `frame` is the number of the next frame: even and odd ones have their samples at other places.
+    pub fn cut(&mut self, frame: u64) {
+        self.past = Past { frames: frame, ..Past::default() };
+    }
+
+    /// Draws a scene and waits for the picture. Frames follow one another until [`Renderer::cut`].
     ///
     /// # Errors
     /// A size, a count or a value outside the limits; the device failed.
@@ -231,9 +290,15 @@ impl Renderer {
         self.check(scene, settings)?;
         let shadow_layers = scene.lights.iter().filter(|l| l.casts_shadow).count() as u32;
         if !self.targets.as_ref().is_some_and(|t| t.matches(settings, shadow_layers)) {
-            let size = settings.size.map(|n| n * settings.supersampling);
-            self.targets =
-                Some(Targets::new(&self.gpu, size, settings.size, settings.shadow_size, shadow_layers));
+            self.targets = Some(Targets::new(&self.gpu, settings, shadow_layers));
+            self.antialias = None;
+            self.past = Past { frames: self.past.frames, ..Past::default() };
+        }
+        if settings.antialias.mode == antialias::Mode::None {
+            self.antialias = None;
+        } else if self.antialias.as_ref().is_none_or(|a| *a.settings() != settings.antialias) {
+            let format = wgpu::TextureFormat::Rgba8Unorm;
+            self.antialias = Some(Antialias::new(&self.gpu, &settings.antialias, settings.size, format)?);
         }
         self.fit_instances(scene);
         self.scatter.prepare(&self.gpu, settings.scatter, &settings.profile)?;
@@ -243,27 +308,26 @@ impl Renderer {
             let table = Transmittance::new(&self.gpu, &settings.profile)?;
             self.transmittance = Some((settings.profile.clone(), table));
         }
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let view = self.record_light(&mut encoder, scene, settings);
-        let mut scatter_noise = None;
-        if let ScatterMethod::ReferenceSurface(batches) = settings.scatter {
-            self.gpu.queue.submit([encoder.finish()]);
-            encoder = self.gpu.device.create_command_encoder(&Default::default());
-            scatter_noise = self.integrate_surface(&mut encoder, scene, settings, &view, batches)?;
+        if matches!(settings.scatter, ScatterMethod::ReferenceSurface(_)) {
+            self.shade.prepare_samples(&self.gpu);
         }
-        self.record_picture(&mut encoder, scene, settings, &view);
+        self.is_scattered = settings.scatter != ScatterMethod::None;
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let scatter_noise = self.record_frame(&mut encoder, scene, settings)?;
         self.gpu.queue.submit([encoder.finish()]);
         let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
-        let rgba = self.gpu.read_texture(&targets.image)?;
+        let image =
+            if self.antialias.is_some() { &targets.image } else { targets.samples[0].displayed.texture() };
+        let rgba = self.gpu.read_texture(image)?;
+        let heads = scene.heads.iter().map(|h| h.head);
         let stats = FrameStats {
             passes_ms: self.timer.read(&self.gpu)?,
-            triangles: scene
-                .heads
-                .iter()
-                .map(|h| u64::from(h.head.opaque_triangles + h.head.overlay_triangles))
-                .sum(),
             scatter_noise,
-            memory_bytes: targets.bytes() + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>(),
+            triangles: heads.clone().map(|h| u64::from(h.opaque_triangles + h.overlay_triangles)).sum(),
+            memory_bytes: targets.bytes()
+                + self.antialias.as_ref().map_or(0, Antialias::memory_bytes)
+                + self.past.history.as_ref().map_or(0, History::memory_bytes)
+                + heads.map(|h| h.memory_bytes).sum::<u64>(),
         };
         Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
     }
@@ -277,6 +341,29 @@ impl Renderer {
         let bytes = self.gpu.read_buffer(&instance.positions)?;
         let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
         Ok(points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect())
+    }
+
+    /// Linear radiance of the last frame (of its last sample), RGB and coverage, rows from the top.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_hdr(&self) -> Result<Vec<[f32; 4]>, RenderError> {
+        let Some(targets) = &self.targets else { return Ok(Vec::new()) };
+        let bytes = self.gpu.read_texture(targets.hdr.texture())?;
+        let halves: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
+    }
+
+    /// Normal and tangent (w = sign of the bitangent) of each vertex of the first head of the last frame, world space.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_surface_frames(&self) -> Result<Vec<(Vec3, glam::Vec4)>, RenderError> {
+        let Some(instance) = self.instances.first() else { return Ok(Vec::new()) };
+        let bytes = self.gpu.read_buffer(&instance.frames)?;
+        let frames: Vec<[f32; 8]> = bytemuck::pod_collect_to_vec(&bytes);
+        let frame = |f: [f32; 8]| (Vec3::new(f[0], f[1], f[2]), glam::Vec4::new(f[4], f[5], f[6], f[7]));
+        Ok(frames.into_iter().map(frame).collect())
     }
 
     /// Diffuse light of the last frame before albedo: linear radiance of a white surface, a = scattering strength.
@@ -363,25 +450,31 @@ impl Renderer {
             }
             let instance = Instance {
                 positions: gpu.storage_zeroed("positions", points),
+                previous_positions: gpu.storage_zeroed("previous positions", points),
                 frames: gpu.storage_zeroed("surface frames", frames),
                 blended: Blended::new(gpu),
             };
             self.instances.truncate(i);
             self.instances.push(instance);
+            self.past = Past { frames: self.past.frames, ..Past::default() };
         }
     }
 
-    /// The passes of a frame in order, up to the light on each pixel; returns the view.
-    fn record_light(
+    /// Every pass of a frame, in order.
+    fn record_frame(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         scene: &Scene<'_>,
         settings: &Settings,
-    ) -> wgpu::Buffer {
+    ) -> Result<Option<f64>, RenderError> {
         let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let size = settings.size.map(|n| n * settings.supersampling);
-        let view = gpu.uniform("view", &view(scene, size));
-        let Some(targets) = &self.targets else { return view };
+        let Some(targets) = &self.targets else { return Ok(None) };
+        let mut scatter_noise = None;
+        let transmittance = match (settings.transmit, settings.scatter) {
+            // The integral over the surface holds the light from behind.
+            (TransmitMethod::None, _) | (_, ScatterMethod::ReferenceSurface(_)) => None,
+            (TransmitMethod::ShadowDepth, _) => self.transmittance.as_ref().map(|(_, t)| t),
+        };
         timer.restart();
         let heads: Vec<(&HeadOnGpu, &Instance)> =
             scene.heads.iter().map(|h| h.head).zip(&self.instances).collect();
@@ -394,15 +487,8 @@ impl Renderer {
             self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
             if let Some(maps) = &head.maps {
                 let state = instance.state;
-                self.appearance.record(
-                    gpu,
-                    encoder,
-                    timer,
-                    maps,
-                    &state.distributions,
-                    &state.zones,
-                    &buffers.blended,
-                );
+                let (distributions, zones) = (&state.distributions, &state.zones);
+                self.appearance.record(gpu, encoder, timer, maps, distributions, zones, &buffers.blended);
             }
         }
 
@@ -410,114 +496,136 @@ impl Renderer {
         for (light, layer) in &layers {
             self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
         }
-        self.visibility.record(gpu, encoder, timer, &view, &drawn, &targets.ids, &targets.depth);
+        let shadows = crate::texture::array_view_of(&targets.shadows);
 
-        let shadows = crate::texture::array_of(&targets.shadows);
-        let transmittance = match (settings.transmit, settings.scatter) {
-            // The integral over the surface holds the light from behind.
-            (TransmitMethod::None, _) | (_, ScatterMethod::ReferenceSurface(_)) => None,
-            (TransmitMethod::ShadowDepth, _) => self.transmittance.as_ref().map(|(_, t)| t),
-        };
-        let lighting = lighting(scene, &view, lights, targets, &shadows, transmittance);
-        let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
-        for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
-            let shaded = shaded(index, instance, head, buffers);
-            self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
-        }
-
-        view
-    }
-
-    /// The reference method, which waits for the device between batches.
-    fn integrate_surface(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        scene: &Scene<'_>,
-        settings: &Settings,
-        view: &wgpu::Buffer,
-        batches: u32,
-    ) -> Result<Option<f64>, RenderError> {
-        self.shade.prepare_samples(&self.gpu);
-        let gpu = &self.gpu;
-        let Some(targets) = &self.targets else { return Ok(None) };
-        let (lights, _) = place_lights(scene, &targets.shadows);
-        let shadows = crate::texture::array_of(&targets.shadows);
-        let lighting = lighting(scene, view, lights, targets, &shadows, None);
-        let inputs = surface::Inputs {
-            view,
-            ids: &targets.ids,
-            irradiance: &targets.irradiance,
-            depth: &targets.depth,
-            scattered: &targets.scattered,
-        };
-        let integral = Surface::new(gpu, &settings.profile, targets.size);
-        let aspect = targets.size[0] as f32 / targets.size[1] as f32;
-        let clip_from_world = scene.camera.clip_from_view(aspect) * scene.camera.view_from_world();
-        for (index, (instance, buffers)) in scene.heads.iter().zip(&self.instances).enumerate() {
-            let head = instance.head;
-            let triangles: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.triangles)?);
-            let vertices: Vec<GpuVertex> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.vertices)?);
-            let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&buffers.positions)?);
-            let points: Vec<Vec3> = points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect();
-            let point_of_vertex: Vec<u32> = vertices.iter().map(|v| v.point).collect();
-            let opaque = &triangles[..head.opaque_triangles as usize];
-            let skin = Skin::new(opaque, &point_of_vertex, &points, &clip_from_world, PICTURE_MARGIN);
-            let shaded = shaded(index, instance, head, buffers);
-            integral.add_head(gpu, &inputs, index as u32, &skin, batches, &mut |e, samples, light| {
-                let count = surface::BATCH as u32;
-                self.shade.record_samples(gpu, e, &lighting, &shaded, [samples, light], count);
-            })?;
-        }
-        integral.record_finish(gpu, encoder, &mut self.timer, &inputs);
-        integral.relative_noise(gpu)
-    }
-
-    /// The passes of a frame in order, from the light on each pixel to the image.
-    fn record_picture(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        scene: &Scene<'_>,
-        settings: &Settings,
-        view: &wgpu::Buffer,
-    ) {
-        let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let Some(targets) = &self.targets else { return };
-        let heads: Vec<(&HeadOnGpu, &Instance)> =
-            scene.heads.iter().map(|h| h.head).zip(&self.instances).collect();
-        let images = Images {
-            irradiance: &targets.irradiance,
-            depth: &targets.depth,
-            scratch: &targets.scratch,
-            scattered: &targets.scattered,
-        };
-        let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view };
-        let diffuse = match settings.scatter {
-            ScatterMethod::ReferenceSurface(_) => &targets.scattered,
-            _ => self.scatter.record(recorder, &images),
-        };
-        self.is_scattered = settings.scatter != ScatterMethod::None;
-
-        let inputs = [diffuse, &targets.albedo, &targets.direct, &targets.depth];
-        self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
-        let overlays: Vec<_> = heads
+        let subsamples = settings.antialias.mode.subsamples(self.past.frames);
+        let share = 1.0 / subsamples.len() as f32;
+        let shading_jitter = subsamples
             .iter()
-            .filter(|(h, _)| h.overlay_triangles > 0)
-            .map(|(h, i)| (*h, &i.positions, &i.frames))
-            .collect();
-        if !overlays.is_empty() {
-            let ambient = average_light(scene);
-            let images = [&targets.depth, &targets.hdr];
-            self.overlay.record(gpu, encoder, timer, view, ambient, &overlays, images);
+            .fold([0.0; 2], |sum, s| [sum[0] - share * s.position_px[0], sum[1] - share * s.position_px[1]]);
+        for (sample, subsample) in targets.samples.iter().zip(subsamples) {
+            let first = &targets.samples[0];
+            // A camera reaches a place in the pixel by moving the image the other way.
+            let jitter = subsample.position_px.map(|p| -p);
+            let view = view(scene, targets.size, [jitter, shading_jitter], self.past.clip_from_world);
+            let view = gpu.uniform("view", &view);
+            self.visibility.record(gpu, encoder, timer, &view, &drawn, &sample.ids, &sample.depth);
+
+            let lighting = Lighting {
+                view: &view,
+                lights,
+                shadows: &shadows,
+                environment: scene.environment,
+                environment_intensity: scene.environment_intensity,
+                ids: &sample.ids,
+                depth: &sample.depth,
+                transmittance,
+                first: (!std::ptr::eq(sample, first)).then_some((&first.ids, &first.depth)),
+            };
+            let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
+            for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
+                let shaded = shaded(index, instance, head, buffers);
+                self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
+            }
+
+            let images = Images {
+                irradiance: &targets.irradiance,
+                depth: &sample.depth,
+                scratch: &targets.scratch,
+                scattered: &targets.scattered,
+            };
+            let diffuse = match settings.scatter {
+                ScatterMethod::ReferenceSurface(batches) => {
+                    let integral = Surface::new(gpu, &settings.profile, targets.size);
+                    let inputs = surface::Inputs {
+                        view: &view,
+                        ids: &sample.ids,
+                        irradiance: &targets.irradiance,
+                        depth: &sample.depth,
+                        scattered: &targets.scattered,
+                    };
+                    // The sums need the light of this frame: the device works on it while samples are drawn.
+                    let fresh = gpu.device.create_command_encoder(&Default::default());
+                    gpu.queue.submit([std::mem::replace(encoder, fresh).finish()]);
+                    integrate(gpu, &self.shade, scene, &heads, &lighting, &integral, &inputs, batches)?;
+                    integral.record_finish(gpu, encoder, timer, &inputs);
+                    scatter_noise = integral.relative_noise(gpu)?;
+                    &targets.scattered
+                }
+                _ => {
+                    let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view: &view };
+                    self.scatter.record(recorder, &images)
+                }
+            };
+
+            let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
+            self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
+            let overlays: Vec<_> = heads
+                .iter()
+                .filter(|(h, _)| h.overlay_triangles > 0)
+                .map(|(h, i)| (*h, &i.positions, &i.frames))
+                .collect();
+            if !overlays.is_empty() {
+                let ambient = average_light(scene);
+                let images = [&sample.depth, &targets.hdr];
+                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
+            }
+
+            let (exposure, samples) = (settings.exposure, settings.supersampling);
+            self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
+            if let Some(velocity) = targets.velocity.as_ref().filter(|_| std::ptr::eq(sample, first)) {
+                // The first frame has nothing before it: its positions stand for the previous ones.
+                let known = self.past.clip_from_world.is_some();
+                let moving: Vec<_> = heads
+                    .iter()
+                    .map(|(head, i)| Moving {
+                        head,
+                        positions: &i.positions,
+                        previous_positions: if known { &i.previous_positions } else { &i.positions },
+                    })
+                    .collect();
+                self.velocity.record(gpu, encoder, timer, &view, &moving, &sample.ids, velocity);
+            }
         }
 
-        let image = targets.image.create_view(&Default::default());
-        let samples = settings.supersampling;
-        self.display.record(gpu, encoder, timer, settings.exposure, samples, &targets.hdr, &image);
+        if let Some(antialias) = &self.antialias {
+            let colors: Vec<_> = targets.samples.iter().map(|s| &s.displayed).collect();
+            let depths: Vec<_> = targets.samples.iter().map(|s| &s.depth).collect();
+            let inputs = antialias::Inputs {
+                colors: &colors,
+                depths: if settings.antialias.needs_depth() { &depths } else { &[] },
+                velocity: targets.velocity.as_ref(),
+                frame: self.past.frames,
+            };
+            let image = targets.image.create_view(&Default::default());
+            let is_temporal = settings.antialias.mode.is_temporal();
+            if is_temporal && self.past.history.is_none() {
+                self.past.history = Some(History::new(gpu, settings.size));
+            }
+            let history = if is_temporal { self.past.history.as_mut() } else { None };
+            antialias.record(gpu, encoder, timer, &inputs, &image, history)?;
+            if is_temporal {
+                for (_, buffers) in &heads {
+                    let (from, to) = (&buffers.positions, &buffers.previous_positions);
+                    encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+                }
+                let aspect = targets.size[0] as f32 / targets.size[1] as f32;
+                let camera = &scene.camera;
+                self.past.clip_from_world = Some(camera.clip_from_view(aspect) * camera.view_from_world());
+                self.past.frames += 1;
+            }
+        }
         timer.resolve(encoder);
+        Ok(scatter_noise)
     }
 }
 
-fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
+fn view(
+    scene: &Scene<'_>,
+    size: [u32; 2],
+    [jitter, shading_jitter]: [[f32; 2]; 2],
+    previous: Option<Mat4>,
+) -> View {
     let camera = &scene.camera;
     let aspect = size[0] as f32 / size[1] as f32;
     let view_from_world = camera.view_from_world();
@@ -527,7 +635,7 @@ fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
     let clip_from_world = camera.clip_from_view(aspect) * view_from_world;
     View {
         clip_from_world,
-        previous_clip_from_world: clip_from_world,
+        previous_clip_from_world: previous.unwrap_or(clip_from_world),
         origin: camera.position.extend(size[1] as f32 / (2.0 * tangent)).to_array(),
         right: axis(Vec3::X * tangent * aspect),
         up: axis(Vec3::Y * tangent),
@@ -535,32 +643,46 @@ fn view(scene: &Scene<'_>, size: [u32; 2]) -> View {
         size,
         head_count: scene.heads.len() as u32,
         has_environment: u32::from(scene.environment.is_some()),
-        jitter: [0.0; 2],
+        jitter,
         near: NEAR_METRES,
         light_count: scene.lights.len() as u32,
+        shading_jitter,
+        padding: [0.0; 2],
     }
 }
 
 /// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
 const PICTURE_MARGIN: f32 = 1.25;
 
-fn lighting<'a>(
-    scene: &Scene<'a>,
-    view: &'a wgpu::Buffer,
-    lights: [GpuLight; MAX_LIGHTS],
-    targets: &'a Targets,
-    shadows: &'a wgpu::TextureView,
-    transmittance: Option<&'a Transmittance>,
-) -> Lighting<'a> {
-    Lighting {
-        view,
-        lights,
-        shadows,
-        environment: scene.environment,
-        environment_intensity: scene.environment_intensity,
-        ids: &targets.ids,
-        transmittance,
+/// Adds all heads to the integral of `reference-surface`.
+fn integrate(
+    gpu: &Gpu,
+    shade: &Shade,
+    scene: &Scene<'_>,
+    heads: &[(&HeadOnGpu, &Instance)],
+    lighting: &Lighting<'_>,
+    integral: &Surface,
+    inputs: &surface::Inputs<'_>,
+    batches: u32,
+) -> Result<(), RenderError> {
+    let size = inputs.scattered.texture().size();
+    let aspect = size.width as f32 / size.height as f32;
+    let clip_from_world = scene.camera.clip_from_view(aspect) * scene.camera.view_from_world();
+    for (index, (instance, (head, buffers))) in scene.heads.iter().zip(heads).enumerate() {
+        let triangles: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.triangles)?);
+        let vertices: Vec<GpuVertex> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.vertices)?);
+        let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&buffers.positions)?);
+        let points: Vec<Vec3> = points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect();
+        let point_of_vertex: Vec<u32> = vertices.iter().map(|v| v.point).collect();
+        let opaque = &triangles[..head.opaque_triangles as usize];
+        let skin = Skin::new(opaque, &point_of_vertex, &points, &clip_from_world, PICTURE_MARGIN);
+        let shaded = shaded(index, instance, head, buffers);
+        integral.add_head(gpu, inputs, index as u32, &skin, batches, &mut |encoder, samples, light| {
+            let count = surface::BATCH as u32;
+            shade.record_samples(gpu, encoder, lighting, &shaded, [samples, light], count);
+        })?;
     }
+    Ok(())
 }
 
 fn shaded<'a>(

@@ -24,6 +24,10 @@ mod gpu;
 mod head;
 mod passes;
 mod scene;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
 mod texture;
 
 pub use environment::{Environment, EnvironmentMap};
@@ -33,6 +37,7 @@ pub use gpu::{AdapterDescription, Gpu, PassTimer, list_adapters};
 pub use head::{
     ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
 };
+pub use passes::antialias;
 pub use passes::scatter::ScatterMethod;
 pub use passes::shade::TransmitMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

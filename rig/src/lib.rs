@@ -36,4 +36,5 @@ pub mod map;
 pub mod mask;
 pub mod names;
 pub mod skin;
+pub mod strain;
 pub mod timeline;

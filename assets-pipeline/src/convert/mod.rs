@@ -1,4 +1,55 @@
 //! Conversions between what files hold and what heads hold.
+//!
+//! ```text
+//! hemoglobin maps --hemoglobin----> neutral map, its mean, scale and bias of every expression
+//! albedo texture  --chromophores--> melanin and hemoglobin maps, residual, out-of-gamut mask
+//! normal map      --normals-------> slopes, difference maps, and back
+//! another head    --transfer------> its distributions on this head's own blood
+//! rest mesh       --occlusion-----> ambient visibility of each point
+//! ```
 
 mod bvh;
+pub mod chromophores;
+pub mod hemoglobin;
+pub mod normals;
 pub mod occlusion;
+pub mod transfer;
+
+use rubor_rig::hemoglobin::HemoglobinError;
+
+use crate::image_io::ImageError;
+
+/// A conversion that its input does not allow.
+#[derive(Debug, thiserror::Error)]
+pub enum ConvertError {
+    /// A file.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// A map that the hemoglobin model cannot use.
+    #[error("{name}: {source}")]
+    Hemoglobin {
+        /// Name of the map: the neutral one or a distribution.
+        name: String,
+        /// The cause.
+        source: HemoglobinError,
+    },
+    /// An argument or an entry of a manifest.
+    #[error("{at}: found {found}, expected {expected}")]
+    Argument {
+        /// Place.
+        at: String,
+        /// What stands there.
+        found: String,
+        /// What should.
+        expected: String,
+    },
+}
+
+impl ConvertError {
+    fn argument(at: impl Into<String>, found: impl Into<String>, expected: impl Into<String>) -> Self {
+        Self::Argument { at: at.into(), found: found.into(), expected: expected.into() }
+    }
+}
+
+#[cfg(test)]
+mod tests;

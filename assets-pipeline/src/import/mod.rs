@@ -6,3 +6,4 @@ pub mod makehuman;
 pub mod materials;
 pub mod obj;
 pub mod obj_set;
+mod tiles;

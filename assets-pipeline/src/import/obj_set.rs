@@ -20,6 +20,7 @@ use rubor_rig::landmarks::paired;
 use super::eye_projection::EyeProjection;
 use super::materials::guess_material;
 use super::obj::{GroupBy, read_polygons, read_positions};
+use super::tiles;
 use crate::convert::occlusion;
 use crate::error::ImportError;
 use crate::poly::{PolyMesh, Shape, build_head};
@@ -136,6 +137,7 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     let mut parts: Vec<(String, Material)> =
         mesh.groups.iter().map(|g| (g.clone(), material_of(g))).collect();
     let eyes = project_eyes(&mut mesh, &mut parts);
+    tiles::pack(&mut mesh, &parts);
     for _ in 0..options.subdivide {
         (mesh, shapes) = mesh.subdivide(&shapes);
     }

@@ -8,7 +8,7 @@ use super::noise::{Stream, features, noise, smoothstep, unit};
 use super::regions::{Regions, eye_distance};
 
 /// Standard deviation of hemoglobin about its regional mean, relative to it, on calm skin.
-const HEMOGLOBIN_SPREAD: f32 = 0.16;
+const HEMOGLOBIN_SPREAD: f32 = 0.14;
 
 /// A mole on the plan of the face.
 struct Mole {
@@ -62,8 +62,8 @@ impl Chromophores {
 
     /// Melanin volume fraction of the epidermis without hair.
     pub(crate) fn melanin(&self, place: Vec3, r: &Regions, cavity: f32) -> f32 {
-        let uneven = 0.07 * self.noise(place, 28.0, 1)
-            + 0.055 * self.noise(place, 9.0, 2)
+        let uneven = 0.055 * self.noise(place, 28.0, 1)
+            + 0.045 * self.noise(place, 9.0, 2)
             + 0.05 * self.noise(place, 3.2, 3)
             + 0.05 * self.noise(place, 1.1, 4);
         // Sun and rubbing darken; the lids are thin and pigmented, the underside of the chin is shaded.
@@ -158,7 +158,7 @@ impl Chromophores {
             - 0.12 * r.upper_lip
             - 0.12 * r.neck
             - 0.10 * r.scalp;
-        let drift = 0.07 * self.noise(place, 32.0, 21) + 0.08 * self.noise(place, 13.0, 22);
+        let drift = 0.06 * self.noise(place, 32.0, 21) + 0.07 * self.noise(place, 13.0, 22);
         let red = 1.22 * r.lips + 1.2 * r.inner * (1.0 - r.lips) + 0.10 * r.lip_border;
         self.hemoglobin * (relative * (1.0 - r.lips) + drift * (1.0 - 0.6 * r.lips) + red).exp()
     }

@@ -20,6 +20,9 @@ use super::surface::Coverage;
 /// Relative change of the mean hemoglobin by region, and how much patchier it becomes.
 struct State {
     name: &'static str,
+    /// Factor of `everywhere` and `change`, tuned by eye on the default head under the skin look-up, whose colour
+    /// follows about the cube root of hemoglobin.
+    strength: f32,
     everywhere: f32,
     change: fn(&Regions) -> f32,
     /// Factor of the relative spread where the mean rises fully.
@@ -29,6 +32,7 @@ struct State {
 const STATES: [State; 9] = [
     State {
         name: "joy",
+        strength: 1.4,
         everywhere: 0.0,
         // The cheek is lifted against the bone; lips and the fold's rim are stretched thin.
         change: |r| {
@@ -40,6 +44,7 @@ const STATES: [State; 9] = [
     },
     State {
         name: "surprise",
+        strength: 1.4,
         everywhere: -0.03,
         // The frontalis folds the forehead; the jaw drops and stretches cheeks and lips.
         change: |r| {
@@ -54,6 +59,7 @@ const STATES: [State; 9] = [
     },
     State {
         name: "fear",
+        strength: 1.6,
         everywhere: -0.16,
         // Vessels close; the mouth is drawn wide.
         change: |r| {
@@ -69,6 +75,7 @@ const STATES: [State; 9] = [
     },
     State {
         name: "anger",
+        strength: 1.6,
         everywhere: 0.08,
         // Brows press blood up the forehead; face, ears and neck flush; lips are pressed pale.
         change: |r| {
@@ -88,6 +95,7 @@ const STATES: [State; 9] = [
     },
     State {
         name: "disgust",
+        strength: 1.4,
         everywhere: -0.02,
         // The nose is wrinkled and drained, the cheek beside it is bunched.
         change: |r| {
@@ -101,6 +109,7 @@ const STATES: [State; 9] = [
     },
     State {
         name: "sadness",
+        strength: 1.5,
         everywhere: -0.04,
         // Eyes and the tip of the nose redden; the tensed chin drains.
         change: |r| {
@@ -114,6 +123,7 @@ const STATES: [State; 9] = [
     },
     State {
         name: "exercise",
+        strength: 1.9,
         everywhere: 0.16,
         // Heat is shed over a large area: cheeks, forehead, temples, neck; the mouth's surroundings stay pale.
         change: |r| {
@@ -133,6 +143,7 @@ const STATES: [State; 9] = [
     },
     State {
         name: "alcohol",
+        strength: 1.9,
         everywhere: 0.05,
         // Centred on nose and inner cheeks, with lids and ears.
         change: |r| {
@@ -151,6 +162,7 @@ const STATES: [State; 9] = [
     },
     State {
         name: "blush",
+        strength: 2.2,
         everywhere: 0.04,
         // Cheeks and ears first, spreading to the neck in blotches.
         change: |r| {
@@ -173,8 +185,11 @@ fn response(state: &State, index: usize, side: f32, place: Vec3, r: &Regions, se
     let own = noise(place, 24.0, seed ^ (0x600 + index as u32));
     let change = (state.change)(r) * (1.0 + side * lateral) * (1.0 + 0.14 * own) + state.everywhere;
     let rise = (change / 0.5).clamp(0.0, 1.0);
-    ((1.0 + change).max(0.2), 1.0 + (state.patchiness - 1.0) * rise)
+    ((1.0 + state.strength * change).max(0.25), 1.0 + (state.patchiness - 1.0) * rise)
 }
+
+/// Place, regions, mean and value of the neutral map at a texel.
+type Neutral = (Vec3, Regions, f32, f32);
 
 /// Neutral and all states as statistics in discs of `radius_px` texels of `coverage`.
 ///
@@ -189,7 +204,7 @@ pub(crate) fn distributions(
     let mut stream = Stream::new(seed ^ 0x51de);
     let sides: Vec<f32> = STATES.iter().map(|_| (0.045 * stream.normal()).clamp(-0.09, 0.09)).collect();
     let side = coverage.resolution();
-    let sites: Vec<Option<(Vec3, Regions, f32, f32)>> = (0..side * side)
+    let sites: Vec<Option<Neutral>> = (0..side * side)
         .into_par_iter()
         .map(|i| {
             let place = coverage.site(i % side, i / side)?.place;
@@ -198,7 +213,7 @@ pub(crate) fn distributions(
         })
         .collect();
     let mask = Mask { width: side, height: side, mapped: sites.iter().map(Option::is_some).collect() };
-    let map_of = |value: &(dyn Fn(&(Vec3, Regions, f32, f32)) -> f32 + Sync)| Map {
+    let map_of = |value: &(dyn Fn(&Neutral) -> f32 + Sync)| Map {
         width: side,
         height: side,
         channels: 1,

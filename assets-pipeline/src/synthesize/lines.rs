@@ -105,15 +105,24 @@ impl Lines {
         &self.lines[index]
     }
 
-    /// Calls `visit` for each line within its reach of `p`.
-    pub(crate) fn near(&self, p: Vec2, mut visit: impl FnMut(Nearest)) {
+    /// Entries of the cell of a place.
+    fn cell(&self, p: Vec2) -> &[(u32, u32)] {
         let cell = ((p - self.origin) / self.cell_mm).floor();
         if cell.x < 0.0 || cell.y < 0.0 || cell.x >= self.columns as f32 || cell.y >= self.rows as f32 {
-            return;
+            return &[];
         }
         let cell = cell.y as usize * self.columns + cell.x as usize;
-        let entries = &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize];
-        for same_line in entries.chunk_by(|a, b| a.0 == b.0) {
+        &self.entries[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// True when no line reaches the cell of a place.
+    pub(crate) fn is_empty_about(&self, p: Vec2) -> bool {
+        self.cell(p).is_empty()
+    }
+
+    /// Calls `visit` for each line within its reach of `p`.
+    pub(crate) fn near(&self, p: Vec2, mut visit: impl FnMut(Nearest)) {
+        for same_line in self.cell(p).chunk_by(|a, b| a.0 == b.0) {
             let index = same_line[0].0 as usize;
             let line = &self.lines[index];
             let mut best = Nearest { line: index, distance_mm: f32::MAX, along_mm: 0.0 };

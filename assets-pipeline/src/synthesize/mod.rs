@@ -28,6 +28,7 @@ mod tests;
 mod wrinkles;
 
 use rubor_rig::head::{Head, Provenance, ProvenanceKind, SkinMaps, WrinkleZone};
+use rubor_rig::skin::chromophores::{MAX_HEMOGLOBIN, MAX_MELANIN};
 use thiserror::Error;
 
 use brows::Hairs;
@@ -180,28 +181,6 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let wrinkles = Wrinkles::new(seed);
     let lasting = lasting_lines(options.age_years);
 
-    let full = surface.rasterise(options.resolution);
-    let texel_mm = surface.texel_mm(options.resolution);
-    let relief = Relief::new(seed, texel_mm, options.age_years);
-    let hairs = Hairs::new(options, texel_mm);
-    let mut detailed = full.bake::<5>(&[1, 1, 2, 1], |site| {
-        let r = Regions::at(site.place);
-        let relief = relief.sample(site, &r);
-        let hair = hairs.cover(site.place, &r);
-        let melanin = chromophores.melanin(site.place, &r, relief.cavity);
-        let hemoglobin = chromophores.hemoglobin_with_mean(site.place, &r).1 * hemoglobin_under_hair(hair);
-        let mut gradient = relief.gradient;
-        if Wrinkles::reach(site.place) {
-            gradient += lasting * wrinkles.gradient(site.place);
-        }
-        let [x, y] = site.slopes(gradient);
-        [melanin.clamp(0.0, 0.5), hemoglobin.clamp(0.0, 0.32), x, y, hair]
-    });
-    let hair = detailed.pop();
-    let slopes = detailed.pop();
-    let hemoglobin = detailed.pop();
-    let melanin = detailed.pop();
-
     let half = surface.rasterise((options.resolution / 2).max(*RESOLUTIONS.start()));
     let texel_mm = surface.texel_mm(half.resolution());
     let half_relief = Relief::new(seed, texel_mm, options.age_years);
@@ -219,16 +198,37 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let specular = broad.pop();
     let wrinkle_slopes = broad;
 
+    let full = surface.rasterise(options.resolution);
+    let texel_mm = surface.texel_mm(options.resolution);
+    let relief = Relief::new(seed, texel_mm, options.age_years);
+    let hairs = Hairs::new(options, texel_mm);
+    let mut detailed = full.bake::<5>(&[1, 1, 2, 1], |site| {
+        let r = Regions::at(site.place);
+        let relief = relief.sample(site, &r);
+        let hair = hairs.cover(site.place, &r);
+        let melanin = chromophores.melanin(site.place, &r, relief.cavity);
+        let (_, hemoglobin) = chromophores.hemoglobin_with_mean(site.place, &r);
+        let [mut x, mut y] = site.slopes(relief.gradient);
+        if let Some(map) = wrinkle_slopes.first() {
+            // Both maps have the same texture frame, so slopes simply add.
+            x += lasting * map.sample(site.uv.x, site.uv.y, 0);
+            y += lasting * map.sample(site.uv.x, site.uv.y, 1);
+        }
+        [melanin.clamp(0.0, MAX_MELANIN as f32), hemoglobin.clamp(0.0, MAX_HEMOGLOBIN as f32), x, y, hair]
+    });
+    let hair = detailed.pop();
+    let slopes = detailed.pop();
+    let hemoglobin = detailed.pop();
+    let melanin = detailed.pop();
+
     let coarse = surface.rasterise(STATISTICS_RESOLUTION);
     let texel_mm = surface.texel_mm(STATISTICS_RESOLUTION);
     let radius_px = (STATISTICS_RADIUS_MM / texel_mm).round().clamp(2.0, 64.0) as u32;
-    let coarse_hairs = Hairs::new(options, texel_mm);
     let (hemoglobin_mean, distributions) =
         expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |place| {
             let r = Regions::at(place);
-            let factor = hemoglobin_under_hair(coarse_hairs.cover(place, &r));
             let (mean, value) = chromophores.hemoglobin_with_mean(place, &r);
-            (r, factor * mean, factor * value)
+            (r, mean, value)
         })?;
     let masks = surface.rasterise(MASK_RESOLUTION);
     let zones = masks
@@ -255,11 +255,6 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
 /// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and dark brown (0.5).
 fn hair_color_linear(melanin: f32) -> [f32; 3] {
     [(0.80, 6.2), (0.72, 7.0), (0.60, 7.8)].map(|(root, absorption)| root * (-absorption * melanin).exp())
-}
-
-/// What hair leaves of the colour of blood.
-fn hemoglobin_under_hair(hair: f32) -> f32 {
-    1.0 - 0.3 * hair
 }
 
 /// Share of the expression wrinkles that stays on the face at rest.

@@ -12,6 +12,9 @@ use super::noise::{features, gradient_noise, noise, smoothstep, unit};
 use super::regions::Regions;
 use super::surface::Site;
 
+/// Mesh of the furrow net, mm.
+const MESH_MM: f32 = 0.62;
+
 /// Relief at a point.
 pub(crate) struct ReliefSample {
     /// Gradient of the height (mm per mm) in canonical space.
@@ -111,14 +114,14 @@ impl Relief {
         let mut cavity = 0.0;
 
         // Unevenness between pores and features.
-        for (wavelength, height_mm, seed) in [(8.0, 0.040, 1u32), (2.7, 0.010, 2)] {
+        for (wavelength, height_mm, seed) in [(8.0, 0.032, 1u32), (2.7, 0.009, 2)] {
             let g = gradient_noise(c / wavelength, self.seed ^ seed).1;
             gradient += g * (height_mm * self.coarseness * dry / wavelength);
         }
 
         if skin > 0.01 {
             let patch = (1.0 + 0.25 * noise(c, 6.0, self.seed ^ 3)).clamp(0.3, 1.7);
-            let (g, depth) = self.furrows(site, tension, r);
+            let (g, depth) = self.furrows(site, tension);
             let depth_mm =
                 0.026 * (1.0 - 0.45 * r.forehead - 0.3 * r.nose + 0.4 * r.lower_cheek + 0.3 * r.neck);
             let strength = skin * patch * self.coarseness;
@@ -148,7 +151,7 @@ impl Relief {
         }
 
         if r.lips > 0.01 {
-            let wave = 0.9 * noise(c, 5.0, self.seed ^ 11);
+            let wave = 0.7 * noise(c, 5.0, self.seed ^ 11);
             let at = c + Vec3::new(wave, 0.0, 0.0);
             for (across, height_mm, seed) in [(1.7, 0.085, 12u32), (0.8, 0.028, 13)] {
                 let (n, g) = grooved(line_noise(at, 90.0, 7.0, across, self.seed ^ seed), 0.03);
@@ -180,8 +183,10 @@ impl Relief {
     }
 
     /// Polygonal net: gradient per mm of depth, and nearness of a furrow.
-    fn furrows(&self, site: &Site, tension: Vec2, r: &Regions) -> (Vec3, f32) {
-        let mesh_mm = (0.62f32).max(1.6 * self.finest_mm) * (1.0 + 0.2 * r.neck.round());
+    fn furrows(&self, site: &Site, tension: Vec2) -> (Vec3, f32) {
+        // A coarse map gets a wider, shallower net: grooves of under two texels would alias into grain.
+        let mesh_mm = MESH_MM.max(2.2 * self.finest_mm);
+        let width = (0.95 * self.finest_mm / mesh_mm).clamp(0.24, 0.45);
         let metric = Metric::new(site.place, tension, 1.9);
         let (mut first, mut second) = (f32::MAX, f32::MAX);
         let (mut at_first, mut at_second) = (Vec3::ZERO, Vec3::ZERO);
@@ -196,11 +201,10 @@ impl Relief {
             }
         });
         let (f1, f2) = (first.sqrt().max(1e-4), second.sqrt().max(1e-4));
-        const WIDTH: f32 = 0.24;
-        let gap = (f2 - f1) / WIDTH;
+        let gap = (f2 - f1) / width;
         let groove = (-gap * gap).exp();
-        let slope = 2.0 * gap / WIDTH * groove / mesh_mm;
-        ((at_second / f2 - at_first / f1) * slope, groove)
+        let slope = 2.0 * gap / width * groove / mesh_mm * (MESH_MM / mesh_mm).sqrt();
+        ((at_second / f2 - at_first / f1) * slope, groove * MESH_MM / mesh_mm)
     }
 
     /// Round pits in the plane of the surface: gradient per mm of depth, and nearness of a pit's bottom.

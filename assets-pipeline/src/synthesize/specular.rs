@@ -43,7 +43,7 @@ pub(crate) fn specular(place: Vec3, r: &Regions, cavity: f32, hair: f32, seed: u
         roughness += weight * (m - roughness);
     }
     // Pores and furrows hold light back; hair scatters it.
-    intensity *= (1.0 - 0.35 * cavity) * (1.0 - 0.45 * hair);
+    intensity *= (1.0 - 0.25 * cavity) * (1.0 - 0.45 * hair);
     roughness += 0.03 * hair;
     [intensity.clamp(0.05, 0.36), roughness.clamp(0.21, 0.34)]
 }

@@ -45,6 +45,8 @@ pub(crate) struct Site {
     pub place: Vec3,
     /// Canonical unit normal.
     pub normal: Vec3,
+    /// Texture coordinate.
+    pub uv: Vec2,
     along_tangent: Vec3,
     along_bitangent: Vec3,
 }
@@ -214,6 +216,14 @@ impl Coverage<'_> {
         Some(site_at(t, p))
     }
 
+    /// The point of the skin at a texture coordinate, on the triangle that its texel shows.
+    #[cfg(test)]
+    pub(crate) fn site_near(&self, uv: Vec2) -> Option<Site> {
+        let texel = (uv * self.resolution as f32).floor();
+        let index = self.shown[(texel.y as u32 * self.resolution + texel.x as u32) as usize];
+        (index != EMPTY).then(|| site_at(&self.surface.triangles[index as usize], uv))
+    }
+
     /// Evaluates fields at every texel that shows skin and fills the rest of the maps from the nearest skin.
     /// `evaluate` returns the texels of maps with the given numbers of channels, one after another.
     pub(crate) fn bake<const N: usize>(
@@ -269,5 +279,11 @@ fn site_at(t: &[Corner; 3], p: Vec2) -> Site {
     let face = (t[1].place - t[0].place).cross(t[2].place - t[0].place);
     let normal = along_tangent.cross(along_bitangent);
     let normal = if normal.dot(face) < 0.0 { -normal } else { normal };
-    Site { place: blend(|c| c.place), normal: normal.normalize_or_zero(), along_tangent, along_bitangent }
+    Site {
+        place: blend(|c| c.place),
+        normal: normal.normalize_or_zero(),
+        uv: p,
+        along_tangent,
+        along_bitangent,
+    }
 }

@@ -31,7 +31,7 @@ const STEP_MM: f32 = 0.12;
 
 /// Course of the nasolabial fold on the left, plan mm: from the wing of the nose past the corner of the mouth.
 const NASOLABIAL: [[f32; 2]; 6] =
-    [[17.5, -37.5], [20.5, -43.0], [25.0, -51.0], [29.3, -60.5], [32.0, -70.0], [32.6, -80.0]];
+    [[17.0, -35.5], [20.5, -42.5], [25.0, -51.0], [29.3, -60.5], [32.0, -70.0], [32.6, -80.0]];
 
 /// Profile of one groove.
 #[derive(Clone, Copy)]
@@ -42,6 +42,8 @@ struct Groove {
     /// Height of the rolls beside it relative to its depth, on the left and on the right of its direction.
     roll: [f32; 2],
     phase: u32,
+    /// Shares of its length over which it fades in and out.
+    taper: [f32; 2],
 }
 
 /// All wrinkles of a person.
@@ -62,8 +64,10 @@ impl Pen {
     fn draw(&mut self, knots: &[Vec2], depth_mm: f32, half_width_mm: f32, roll: [f32; 2]) {
         let phase = (self.stream.range(0.0, 1.0) * 65536.0) as u32;
         let vary = self.stream.range(0.85, 1.15);
-        self.grooves.push(Groove { depth_mm: depth_mm * vary, half_width_mm, roll, phase });
-        self.lines.push(Line::through(knots, 1.5, 5.0 * half_width_mm));
+        let taper = [0.32; 2];
+        self.grooves.push(Groove { depth_mm: depth_mm * vary, half_width_mm, roll, phase, taper });
+        // The reach has room for the wander of `height_on_plan` and the steps of the gradient.
+        self.lines.push(Line::through(knots, 1.5, 5.0 * half_width_mm + 2.5));
     }
 
     /// A value a few percent off.
@@ -88,6 +92,7 @@ impl Wrinkles {
     }
 
     /// Height of the wrinkled skin over the smooth one at full strength, mm.
+    #[cfg(test)]
     pub(crate) fn height_mm(&self, place: Vec3) -> f32 {
         self.height_on_plan(plan(place))
     }
@@ -97,7 +102,7 @@ impl Wrinkles {
         let at = p.extend(0.0);
         let wave = |wavelength: f32, seed| noise(at, wavelength, self.seed ^ seed);
         let wander =
-            Vec2::new(wave(9.0, 1), wave(9.0, 2)) * 0.5 + Vec2::new(wave(3.1, 3), wave(3.1, 4)) * 0.2;
+            Vec2::new(wave(9.0, 1), wave(9.0, 2)) * 0.34 + Vec2::new(wave(3.1, 3), wave(3.1, 4)) * 0.06;
         let mut height = 0.0;
         self.lines.near(p + wander, |n| {
             let groove = &self.grooves[n.line];
@@ -107,9 +112,12 @@ impl Wrinkles {
         height + self.chin_dimples_mm(p)
     }
 
-    /// Gradient of [`Self::height_mm`] in canonical space.
+    /// Gradient of the height (mm) of the wrinkled skin over the smooth one at full strength, in canonical space.
     pub(crate) fn gradient(&self, place: Vec3) -> Vec3 {
         let p = plan(place);
+        if self.lines.is_empty_about(p) && chin_weight(p) <= 0.0 {
+            return Vec3::ZERO;
+        }
         let h = |d: Vec2| self.height_on_plan(p + d);
         let difference = Vec2::new(
             h(Vec2::new(STEP_MM, 0.0)) - h(Vec2::new(-STEP_MM, 0.0)),
@@ -149,9 +157,9 @@ impl Groove {
     fn height_mm(&self, distance_mm: f32, along_mm: f32, length_mm: f32, seed: u32) -> f32 {
         let t = (along_mm / length_mm).clamp(0.0, 1.0);
         // Fades at its ends, and swells and thins along its course.
-        let taper = smoothstep(0.0, 0.32, t) * smoothstep(1.0, 0.68, t);
+        let taper = smoothstep(0.0, self.taper[0], t) * smoothstep(1.0, 1.0 - self.taper[1], t);
         let swell = gradient_noise(Vec3::new(along_mm / 7.0, self.phase as f32 * 0.37, 0.5), seed ^ 0x5e11).0;
-        let depth = self.depth_mm * taper * (1.0 + 0.28 * swell).clamp(0.25, 1.6);
+        let depth = self.depth_mm * taper * (1.0 + 0.22 * swell).clamp(0.25, 1.6);
         let w = self.half_width_mm * (0.75 + 0.25 * taper);
         let x = distance_mm / w;
         let groove = -(-x * x).exp();
@@ -185,11 +193,11 @@ fn forehead(pen: &mut Pen) {
                 .map(|i| {
                     let s = from + (to - from) * i as f32 / count as f32;
                     let wing = 3.2 * (1.0 - ((s.abs() - 27.0) / 27.0).powi(2)).max(-1.2);
-                    Vec2::new(s, y + offset + wing + 0.55 * pen.stream.normal())
+                    Vec2::new(s, y + offset + wing + 0.38 * pen.stream.normal())
                 })
                 .collect();
             let share = ((to - from) / 45.0).clamp(0.6, 1.0);
-            pen.draw(&knots, depth * share, 1.15, [0.34, 0.24]);
+            pen.draw(&knots, depth * share, 1.2, [0.28, 0.2]);
             // A fine companion beside part of it.
             if pen.stream.range(0.0, 1.0) < 0.6 {
                 let up =
@@ -310,11 +318,15 @@ fn nasolabial(pen: &mut Pen, side: f32) {
         .collect();
     // The cheek rolls over the fold; the lip side stays flat. Downwards along the line, the cheek of the left side
     // is on the left.
-    let roll = if side > 0.0 { [0.5, 0.1] } else { [0.1, 0.5] };
-    pen.draw(&knots, 1.0, 2.2, roll);
+    let roll = if side > 0.0 { [0.22, 0.04] } else { [0.04, 0.22] };
+    pen.draw(&knots, 1.15, 2.7, roll);
+    // It is deepest at the wing of the nose and runs out below the mouth.
+    if let Some(fold) = pen.grooves.last_mut() {
+        fold.taper = [0.12, 0.45];
+    }
     let outer = [[31.0, -47.0], [36.0, -55.0], [39.0, -64.0], [40.0, -73.0]]
         .map(|[s, y]| Vec2::new(side * (s + shift), y + 0.5 * pen.stream.normal()));
-    pen.draw(&outer, 0.36, 1.5, roll);
+    pen.draw(&outer, 0.22, 1.6, roll);
 }
 
 /// The groove between lower lip and chin.
@@ -368,7 +380,7 @@ pub(crate) fn zone_weights(place: Vec3) -> [f32; 12] {
     let fold_s = through(&NASOLABIAL_BY_HEIGHT, -p.y);
     let fold = front
         * smoothstep(13.0, 9.0, (s - fold_s - 3.5).abs())
-        * smoothstep(-34.0, -39.0, p.y)
+        * smoothstep(-32.0, -38.0, p.y)
         * smoothstep(-89.0, -80.0, p.y)
         * (1.0 - nose);
     // The crease under the lip belongs to the chin.

@@ -1,5 +1,6 @@
 //! One folder a pass: `mod.rs` with its theory, parameters and recording, its kernels, its tests.
 
+pub mod antialias;
 pub(crate) mod appearance;
 pub(crate) mod compose;
 pub(crate) mod display;
@@ -9,4 +10,5 @@ pub(crate) mod scatter;
 pub(crate) mod shade;
 pub(crate) mod shadow;
 pub(crate) mod surface_frames;
+pub(crate) mod velocity;
 pub(crate) mod visibility;

@@ -16,11 +16,14 @@ struct View {
     jitter: vec2f,
     near: f32,
     light_count: u32,
+    // Where in the pixel light is computed: the mean of the samples that share it, as a jitter.
+    shading_jitter: vec2f,
+    padding: vec2f,
 }
 
 // Ray through a point of the image in pixels (pixel centres are at .5).
-fn pixel_ray(view: View, pixel: vec2f) -> vec3f {
-    let ndc = vec2f(2.0, -2.0) * ((pixel - view.jitter) / vec2f(view.size)) + vec2f(-1.0, 1.0);
+fn pixel_ray(view: View, pixel: vec2f, jitter: vec2f) -> vec3f {
+    let ndc = vec2f(2.0, -2.0) * ((pixel - jitter) / vec2f(view.size)) + vec2f(-1.0, 1.0);
     return view.forward.xyz + ndc.x * view.right.xyz + ndc.y * view.up.xyz;
 }
 

@@ -18,7 +18,7 @@
 pub mod histogram_matching;
 mod local_statistics;
 
-pub use local_statistics::{LocalStatistics, local_statistics};
+pub use local_statistics::{LocalStatistics, MAX_RADIUS_PX, local_statistics};
 
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
 //! From radiance to the picture that a person sees.
 //!
 //! ```text
-//! hdr (samples x samples pixels each) --display--> image (rgba8unorm, sRGB transfer, a = coverage)
+//! hdr (samples x samples pixels each) --display--> image (rgba8unorm, sRGB transfer, opaque)
 //! ```
 //!
 //! Theory: exposure, the filmic curve of Hable 2010 (papers/004 section 8.3 and ch. 11: "really crisp blacks"),

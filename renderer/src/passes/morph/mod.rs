@@ -17,9 +17,6 @@ use glam::Mat4;
 use crate::gpu::{Gpu, PassTimer};
 use crate::head::HeadOnGpu;
 
-#[cfg(test)]
-mod tests;
-
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = include_str!("morph.wgsl");
 

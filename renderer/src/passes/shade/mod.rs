@@ -117,6 +117,8 @@ pub(crate) struct Params {
     pub(crate) wrinkle_map_count: u32,
     pub(crate) transmit: [f32; 4],
     pub(crate) hair_color: [f32; 4],
+    pub(crate) is_second_sample: u32,
+    pub(crate) padding: [u32; 3],
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
@@ -160,6 +162,9 @@ pub(crate) struct Lighting<'a> {
     pub(crate) environment: Option<&'a Environment>,
     pub(crate) environment_intensity: f32,
     pub(crate) ids: &'a wgpu::TextureView,
+    pub(crate) depth: &'a wgpu::TextureView,
+    /// Ids and depth of the pixel's first sample, where this is not it: what looks the same there is not shaded again.
+    pub(crate) first: Option<(&'a wgpu::TextureView, &'a wgpu::TextureView)>,
     pub(crate) transmittance: Option<&'a Transmittance>,
 }
 
@@ -269,6 +274,9 @@ impl Shade {
                 wgpu::BindingResource::Sampler(&self.trilinear_repeat),
                 wgpu::BindingResource::Sampler(&self.linear_clamp),
                 wgpu::BindingResource::Sampler(&self.compare),
+                texture(lighting.depth),
+                texture(lighting.first.map_or(lighting.ids, |f| f.0)),
+                texture(lighting.first.map_or(lighting.depth, |f| f.1)),
                 texture(lighting.transmittance.map_or(&self.black, |t| &t.table)),
             ],
         );
@@ -381,6 +389,8 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
         environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
         has_maps: u32::from(maps.is_some()),
         wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
+        is_second_sample: u32::from(lighting.first.is_some()),
+        padding: [0; 3],
         transmit: lighting
             .transmittance
             .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),

@@ -88,7 +88,7 @@ impl<'a> SkinInverse<'a> {
                 let next = [0, 1].map(|i| (at[i] + step[i] as f32).clamp(0.0, 1.0));
                 let next_error = distance2(lab_at(self.lookup, next));
                 if next_error < error {
-                    improved = error - next_error > 1e-9;
+                    improved = error - next_error > 1e-6;
                     (at, error) = (next, next_error);
                     damping = (damping * 0.2).max(1e-9);
                     break;
@@ -102,6 +102,34 @@ impl<'a> SkinInverse<'a> {
         let [melanin, hemoglobin] = fractions_at(f64::from(at[0]), f64::from(at[1])).map(|f| f as f32);
         let residual = ciede2000(lab_at(self.lookup, at), target) as f32;
         ChromophoreFit { melanin, hemoglobin, residual }
+    }
+
+    /// The melanin whose colour is nearest (in CIELAB) when the hemoglobin is known: for hair, make-up and shadow,
+    /// whose grey would otherwise be read as blood.
+    pub fn fit_melanin(&self, rgb_linear: [f32; 3], hemoglobin: f32) -> ChromophoreFit {
+        let target = lab_from_rec709(rgb_linear.map(f64::from));
+        let v = super::lookup_address(0.0, f64::from(hemoglobin))[1] as f32;
+        let distance2 = |u: f32| {
+            let lab = lab_at(self.lookup, [u, v]);
+            (0..3).map(|i| (lab[i] - target[i]).powi(2)).sum::<f64>()
+        };
+        let steps = 32;
+        let coarse = |i: u32| i as f32 / steps as f32;
+        let best =
+            (0..=steps).min_by(|a, b| distance2(coarse(*a)).total_cmp(&distance2(coarse(*b)))).unwrap_or(0);
+        // Lightness falls with melanin, so the distance has one valley around the best step.
+        let (mut low, mut high) = (coarse(best.saturating_sub(1)), coarse((best + 1).min(steps)));
+        for _ in 0..20 {
+            let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if distance2(a) < distance2(b) {
+                high = b;
+            } else {
+                low = a;
+            }
+        }
+        let u = 0.5 * (low + high);
+        let residual = ciede2000(lab_at(self.lookup, [u, v]), target) as f32;
+        ChromophoreFit { melanin: fractions_at(f64::from(u), 0.0)[0] as f32, hemoglobin, residual }
     }
 }
 

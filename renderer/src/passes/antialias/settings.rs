@@ -1,0 +1,277 @@
+//! What to antialias by: modes, presets and every single setting.
+
+use serde::{Deserialize, Serialize};
+
+/// Antialiasing methods of chapters 9 and 10, by the names that files and the command use. Supersampling
+/// (`ssaa:N`) belongs to the frame, since it draws more pixels instead of filtering them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// The image is copied.
+    None,
+    /// Practical morphological antialiasing (chapter 9).
+    Mlaa,
+    /// One sample a pixel.
+    #[default]
+    #[serde(rename = "smaa-1x")]
+    Smaa1x,
+    /// Two samples a pixel, each filtered for its own place in the pixel.
+    #[serde(rename = "smaa-s2x")]
+    SmaaS2x,
+    /// One sample a pixel at alternating places and the reprojected previous frame.
+    #[serde(rename = "smaa-t2x")]
+    SmaaT2x,
+    /// Two samples a pixel at alternating places and the reprojected previous frame.
+    #[serde(rename = "smaa-4x")]
+    Smaa4x,
+}
+
+/// One image sample of a frame: where in the pixel it is taken and which coverage belongs there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Subsample {
+    /// Place relative to the pixel's centre in pixels, x to the right, y **down**. A camera reaches it by moving
+    /// the projected image by the negative of it.
+    pub position_px: [f32; 2],
+    /// Blocks of the area texture: for left edges, for top edges, for diagonals that rise to the right and for
+    /// diagonals that fall to the right.
+    pub blocks: [usize; 4],
+}
+
+const CENTER: Subsample = Subsample { position_px: [0.0, 0.0], blocks: [0, 0, 0, 0] };
+/// Figure 10.11 left: two samples on the diagonal of the pixel.
+const PAIR: [Subsample; 2] = [
+    Subsample { position_px: [0.25, 0.25], blocks: [1, 1, 1, 0] },
+    Subsample { position_px: [-0.25, -0.25], blocks: [2, 2, 2, 0] },
+];
+/// Figure 10.11 right: the pair, moved by an eighth along the other diagonal in each of two frames.
+const QUAD: [[Subsample; 2]; 2] = [
+    [
+        Subsample { position_px: [0.375, 0.125], blocks: [5, 3, 1, 3] },
+        Subsample { position_px: [-0.125, -0.375], blocks: [4, 6, 2, 3] },
+    ],
+    [
+        Subsample { position_px: [0.125, 0.375], blocks: [3, 5, 1, 4] },
+        Subsample { position_px: [-0.375, -0.125], blocks: [6, 4, 2, 4] },
+    ],
+];
+
+impl Mode {
+    /// Every mode, from nothing to the best.
+    pub const ALL: [Self; 6] =
+        [Self::None, Self::Mlaa, Self::Smaa1x, Self::SmaaT2x, Self::SmaaS2x, Self::Smaa4x];
+
+    /// The name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Mlaa => "mlaa",
+            Self::Smaa1x => "smaa-1x",
+            Self::SmaaS2x => "smaa-s2x",
+            Self::SmaaT2x => "smaa-t2x",
+            Self::Smaa4x => "smaa-4x",
+        }
+    }
+
+    /// The samples that frame number `frame` has to be drawn with, in the order in which `record` wants them.
+    pub fn subsamples(self, frame: u64) -> &'static [Subsample] {
+        let turn = (frame % 2) as usize;
+        match self {
+            Self::None | Self::Mlaa | Self::Smaa1x => std::slice::from_ref(&CENTER),
+            Self::SmaaS2x => &PAIR,
+            Self::SmaaT2x => std::slice::from_ref(&PAIR[turn]),
+            Self::Smaa4x => &QUAD[turn],
+        }
+    }
+
+    /// Whether the mode needs velocities and the previous frame.
+    pub fn is_temporal(self) -> bool {
+        matches!(self, Self::SmaaT2x | Self::Smaa4x)
+    }
+}
+
+/// Where edges come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum EdgeSource {
+    /// Luma of the encoded colour (equation 9.2): fast and mostly right.
+    #[default]
+    Luma,
+    /// The channel which differs most: finds edges between colours of equal luma.
+    Color,
+    /// Depth: finds no edges in shading, and creases only where depth jumps.
+    Depth,
+}
+
+/// How the image's colours are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Encoding {
+    /// Values went through the sRGB transfer function. Edge detection reads them as they are.
+    #[default]
+    Srgb,
+    /// Values are proportional to light and may exceed one. Edge detection encodes them first.
+    Linear,
+}
+
+/// The space in which neighbours are mixed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum BlendSpace {
+    /// Proportional to light: coverage is a fraction of light, so this is right.
+    #[default]
+    Linear,
+    /// The values as stored: for comparisons with programs that do so.
+    Stored,
+}
+
+/// What alpha means for the colours beside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Alpha {
+    /// Colours are as they would be at full cover (PNG).
+    #[default]
+    Straight,
+    /// Colours are already multiplied by alpha (EXR, renderers).
+    Associated,
+}
+
+/// Which left edges a diagonal stands for, beside the top edges that it was found at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum DiagonalEdges {
+    /// Those of its own steps: for diagonals that fall to the right they belong to the next pixel. Both kinds of
+    /// diagonals then look alike.
+    #[default]
+    Both,
+    /// Always that of the same pixel, as in the published shader: the steps of falling diagonals get weights twice.
+    Published,
+}
+
+/// Makes colour edges count more where depth jumps too: the threshold is raised everywhere and lowered there.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Predication {
+    /// Difference of depths which counts as a jump, in units of the depth texture.
+    pub depth_threshold: f32,
+    /// Factor on the threshold.
+    pub scale: f32,
+    /// Part of the raised threshold which is taken off at a jump, 0 to 1.
+    pub strength: f32,
+}
+
+impl Default for Predication {
+    fn default() -> Self {
+        Self { depth_threshold: 0.01, scale: 2.0, strength: 0.4 }
+    }
+}
+
+/// Quality of SMAA as published: threshold, search steps of two pixels, diagonal steps, corner rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// 0.15, 4 steps, no diagonals, no corners.
+    Low,
+    /// 0.1, 8 steps, no diagonals, no corners.
+    Medium,
+    /// 0.1, 16 steps, 8 diagonal steps, corners rounded by a quarter.
+    #[default]
+    High,
+    /// 0.05, 32 steps, 16 diagonal steps, corners rounded by a quarter.
+    Ultra,
+}
+
+/// Everything that decides what the pass does.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+pub struct Settings {
+    /// The method.
+    pub mode: Mode,
+    /// Where edges come from.
+    pub edges: EdgeSource,
+    /// Smallest difference that is an edge, in encoded colour, over 0 up to 0.5. Lower finds more edges.
+    pub threshold: f32,
+    /// Smallest difference of depths that is an edge for [`EdgeSource::Depth`], in units of the depth texture.
+    pub depth_threshold: f32,
+    /// Half the distance in pixels to which ends of lines are searched, 1 to 112. (One step is two pixels.)
+    pub search_steps: u32,
+    /// Distance in pixels to which ends of diagonals are searched, 0 (no diagonals) to 19.
+    pub diagonal_steps: u32,
+    /// Which left edges belong to diagonals.
+    pub diagonal_edges: DiagonalEdges,
+    /// How much corners are rounded in percent, 0 (kept sharp) to 100 (like any line).
+    pub corner_rounding: u32,
+    /// Depth lowers the threshold of colour edges.
+    pub predication: Option<Predication>,
+    /// How the colours are stored.
+    pub encoding: Encoding,
+    /// What alpha means.
+    pub alpha: Alpha,
+    /// Where neighbours are mixed.
+    pub blend_space: BlendSpace,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self::new(Mode::Smaa1x, Preset::High)
+    }
+}
+
+impl Settings {
+    /// The settings of a preset. Of MLAA only the threshold follows the preset; it searches 8 pixels, as far as
+    /// its table goes.
+    pub fn new(mode: Mode, preset: Preset) -> Self {
+        let (threshold, search_steps, diagonal_steps, corner_rounding) = match preset {
+            Preset::Low => (0.15, 4, 0, 100),
+            Preset::Medium => (0.1, 8, 0, 100),
+            Preset::High => (0.1, 16, 8, 25),
+            Preset::Ultra => (0.05, 32, 16, 25),
+        };
+        let (search_steps, diagonal_steps, corner_rounding) =
+            if mode == Mode::Mlaa { (4, 0, 100) } else { (search_steps, diagonal_steps, corner_rounding) };
+        Self {
+            mode,
+            edges: EdgeSource::Luma,
+            threshold,
+            depth_threshold: threshold * 0.1,
+            search_steps,
+            diagonal_steps,
+            diagonal_edges: DiagonalEdges::Both,
+            corner_rounding,
+            predication: None,
+            encoding: Encoding::Srgb,
+            alpha: Alpha::Straight,
+            blend_space: BlendSpace::Linear,
+        }
+    }
+
+    /// Checks ranges.
+    ///
+    /// # Errors
+    /// Names the first setting out of range, what it is and what it may be.
+    pub fn validate(&self) -> Result<(), super::AntialiasError> {
+        let check = |name: &'static str, found: f32, range: std::ops::RangeInclusive<f32>| {
+            if range.contains(&found) {
+                Ok(())
+            } else {
+                let expected = format!("{} to {}", range.start(), range.end());
+                Err(super::AntialiasError::Setting { name, found, expected })
+            }
+        };
+        check("threshold", self.threshold, 1e-4..=0.5)?;
+        check("depth-threshold", self.depth_threshold, f32::MIN_POSITIVE..=f32::MAX)?;
+        let longest = if self.mode == Mode::Mlaa { 4.0 } else { 112.0 };
+        check("search-steps", self.search_steps as f32, 1.0..=longest)?;
+        check("diagonal-steps", self.diagonal_steps as f32, 0.0..=19.0)?;
+        check("corner-rounding", self.corner_rounding as f32, 0.0..=100.0)?;
+        if let Some(predication) = self.predication {
+            check("predication.depth_threshold", predication.depth_threshold, f32::MIN_POSITIVE..=f32::MAX)?;
+            check("predication.scale", predication.scale, 1.0..=5.0)?;
+            check("predication.strength", predication.strength, 0.0..=1.0)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the pass reads depth.
+    pub fn needs_depth(&self) -> bool {
+        self.edges == EdgeSource::Depth || self.predication.is_some()
+    }
+}

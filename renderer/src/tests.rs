@@ -1,0 +1,360 @@
+//! Shaders against Rust, kernels against the CPU, and what every frame keeps to.
+
+use std::sync::Arc;
+
+use glam::{Mat4, Quat, Vec2, Vec3};
+use rubor_rig::deform;
+use rubor_rig::face_state::FaceState;
+use rubor_rig::head::{BlendShape, Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
+use rubor_rig::map::Map;
+use rubor_rig::skin::profile::Profile;
+
+use crate::frame::View;
+use crate::head::GpuVertex;
+use crate::passes::{
+    antialias, appearance, compose, display, morph, overlay, shade, shadow, surface_frames, velocity,
+    visibility,
+};
+use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
+use crate::{
+    Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
+    Renderer, ScatterMethod, Scene, Settings, TransmitMethod,
+};
+
+#[test]
+fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
+    let square = |name: &str| vec![(name.to_owned(), [8, 8, 1])];
+    let line = |name: &str| vec![(name.to_owned(), [64, 1, 1])];
+    assert_eq!(validated_workgroups(morph::SHADER), line("morph"));
+    assert_eq!(validated_workgroups(surface_frames::SHADER), line("surface_frames"));
+    assert_eq!(validated_workgroups(appearance::SHADER), square("appearance"));
+    assert_eq!(validated_workgroups(shade::SHADER), square("shade"));
+    assert_eq!(validated_workgroups(compose::SHADER), square("compose"));
+    assert_eq!(validated_workgroups(display::SHADER), square("display"));
+    assert_eq!(validated_workgroups(velocity::SHADER), square("velocity_main"));
+    for raster in [shadow::SHADER, visibility::SHADER, overlay::SHADER] {
+        assert_eq!(validated_workgroups(raster), []);
+    }
+}
+
+#[test]
+fn structs_are_laid_out_alike_on_both_sides() {
+    assert_layout(
+        visibility::SHADER,
+        "View",
+        size_of::<View>(),
+        &offsets!(View; clip_from_world as "clip_from_world",
+            previous_clip_from_world as "previous_clip_from_world", origin as "origin", right as "right",
+            up as "up", forward as "forward", size as "size", head_count as "head_count",
+            has_environment as "has_environment", jitter as "jitter", near as "near",
+            light_count as "light_count", shading_jitter as "shading_jitter"),
+    );
+    assert_layout(
+        visibility::SHADER,
+        "Vertex",
+        size_of::<GpuVertex>(),
+        &offsets!(GpuVertex; point as "point", u as "u", v as "v"),
+    );
+    assert_layout(
+        morph::SHADER,
+        "Params",
+        size_of::<morph::Params>(),
+        &offsets!(morph::Params; world_from_head as "world_from_head", point_count as "point_count"),
+    );
+    assert_layout(
+        appearance::SHADER,
+        "Params",
+        size_of::<appearance::Params>(),
+        &offsets!(appearance::Params; distribution_count as "distribution_count", zone_count as "zone_count",
+            distribution_weights as "distribution_weights", zone_weights as "zone_weights",
+            zone_maps as "zone_maps"),
+    );
+    assert_layout(
+        shade::SHADER,
+        "Light",
+        size_of::<shade::GpuLight>(),
+        &offsets!(shade::GpuLight; clip_from_world as "clip_from_world", color as "color",
+            position as "position", spot as "spot", shape as "shape", shadow as "shadow"),
+    );
+    assert_layout(
+        shade::SHADER,
+        "Params",
+        size_of::<shade::Params>(),
+        &offsets!(shade::Params; slope_scale as "slope_scale", wrinkle_strength as "wrinkle_strength",
+            hemoglobin_scale as "hemoglobin_scale", head as "head",
+            environment_intensity as "environment_intensity", environment_levels as "environment_levels",
+            has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", transmit as "transmit", hair_color as "hair_color",
+            is_second_sample as "is_second_sample", harmonics as "harmonics", lights as "lights"),
+    );
+    assert_layout(
+        overlay::SHADER,
+        "Params",
+        size_of::<overlay::Params>(),
+        &offsets!(overlay::Params; ambient as "ambient", first as "first"),
+    );
+    assert_layout(
+        display::SHADER,
+        "Params",
+        size_of::<display::Params>(),
+        &offsets!(display::Params; exposure as "exposure", samples as "samples"),
+    );
+}
+
+/// A dome of skin 16 cm across that faces +Z, with a texture seam along x = 0, two shapes and maps of every kind.
+fn dome() -> Head {
+    const N: usize = 24;
+    let at = |i: usize| i as f32 / (N - 1) as f32 * 2.0 - 1.0;
+    let mut mesh = Mesh::default();
+    let mut vertex_of = vec![[0u32; 2]; N * N];
+    for y in 0..N {
+        for x in 0..N {
+            let p = Vec2::new(at(x), at(y));
+            let height = (1.2 - p.length_squared()).max(0.0).sqrt();
+            mesh.points.push(0.08 * p.extend(height));
+            // Left and right half lie in different places of the texture; column 12 belongs to both.
+            for (side, slot) in vertex_of[y * N + x].iter_mut().enumerate() {
+                let u = 0.25 * (p.x + 1.0) + 0.5 * side as f32 - if side == 1 { 0.25 } else { 0.0 };
+                *slot = mesh.vertices.len() as u32;
+                mesh.vertices.push(Vertex { point: (y * N + x) as u32, uv: Vec2::new(u, 0.5 - 0.5 * p.y) });
+            }
+        }
+    }
+    for y in 0..N - 1 {
+        for x in 0..N - 1 {
+            let side = usize::from(x >= N / 2);
+            let v = |x: usize, y: usize| vertex_of[y * N + x][side];
+            let corners = [v(x, y), v(x + 1, y), v(x + 1, y + 1), v(x, y + 1)];
+            mesh.triangles.push([corners[0], corners[1], corners[2]]);
+            mesh.triangles.push([corners[0], corners[2], corners[3]]);
+        }
+    }
+    let end = mesh.triangles.len() as u32;
+    mesh.parts.push(Part { name: "skin".into(), material: Material::Skin, triangles: 0..end });
+    let shape = |name: &str, every: usize, offset: fn(Vec3) -> Vec3| {
+        let points: Vec<u32> = (0..mesh.points.len()).step_by(every).map(|p| p as u32).collect();
+        let offsets = points.iter().map(|p| offset(mesh.points[*p as usize])).collect();
+        BlendShape { name: name.into(), points, offsets }
+    };
+    let shapes = vec![
+        shape("swell", 1, |p| 0.02 * p.normalize()),
+        shape("ripple", 3, |p| Vec3::new(0.0, 0.004, 0.006 * (90.0 * p.x).sin())),
+    ];
+    let flat = |value| Map::filled(8, 8, &[value]);
+    let maps = SkinMaps {
+        melanin: Some(flat(0.03)),
+        hemoglobin: Some(flat(0.02)),
+        hemoglobin_mean: Some(flat(0.02)),
+        distributions: vec![Distribution { name: "blush".into(), scale: flat(1.2), bias: flat(0.05) }],
+        slopes: Some(Map::filled(8, 8, &[0.0, 0.0])),
+        wrinkle_slopes: vec![Map::filled(8, 8, &[0.5, 0.0])],
+        zones: vec![WrinkleZone { name: "all".into(), wrinkle_map: 0, mask: flat(1.0) }],
+        specular: Some(Map::filled(8, 8, &[0.5, 0.3])),
+        scattering: Some(flat(1.0)),
+        ..SkinMaps::default()
+    };
+    Head { name: "dome".into(), mesh, shapes, maps, ..Head::default() }
+}
+
+const WHITE_TABLE: ColorTable<'static> = ColorTable { width: 2, height: 2, texels: &[[0.8; 3]; 4] };
+
+fn renderer() -> Option<Renderer> {
+    gpu()?;
+    let gpu = Gpu::new(std::env::var("RUBOR_ADAPTER").ok().as_deref()).ok()?;
+    Some(Renderer::new(gpu).expect("the passes compile"))
+}
+
+fn settings(size: [u32; 2]) -> Settings {
+    Settings {
+        size,
+        scatter: ScatterMethod::Separable(17),
+        transmit: TransmitMethod::ShadowDepth,
+        profile: Arc::new(Profile::deon_six()),
+        antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
+        supersampling: 1,
+        shadow_size: 256,
+        exposure: 1.0,
+    }
+}
+
+const CAMERA: Camera =
+    Camera { position: Vec3::new(0.0, 0.0, 0.5), target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 25.0 };
+
+fn lamp() -> Light {
+    Light {
+        kind: LightKind::Spot {
+            position: Vec3::new(0.4, 0.5, 0.7),
+            direction: Vec3::new(-0.4, -0.5, -0.7),
+            outer_degrees: 30.0,
+            inner_degrees: 20.0,
+        },
+        color_linear: Vec3::splat(2.0),
+        radius: 0.03,
+        casts_shadow: true,
+    }
+}
+
+fn draw(
+    renderer: &mut Renderer,
+    head: &HeadOnGpu,
+    state: &FaceState,
+    lights: &[Light],
+    settings: &Settings,
+) -> Result<Image, RenderError> {
+    let heads = [HeadInstance { head, state, world_from_head: Mat4::IDENTITY }];
+    let environment = EnvironmentMap::from_fn(16, 8, |_| Vec3::ONE).upload(renderer.gpu());
+    let scene = Scene {
+        heads: &heads,
+        camera: CAMERA,
+        lights,
+        environment: Some(&environment),
+        environment_intensity: 0.5,
+        background_linear: Vec3::ZERO,
+    };
+    Ok(renderer.render(&scene, settings)?.0)
+}
+
+#[test]
+fn the_morph_kernel_places_points_where_the_cpu_does() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let mut state = FaceState::neutral(&head);
+    state.shapes = vec![0.7, -0.4];
+    state.head_rotation = Quat::from_rotation_y(0.3);
+    state.head_translation = Vec3::new(0.01, 0.0, -0.02);
+    draw(&mut renderer, &on_gpu, &state, &[lamp()], &settings([27, 51])).expect("it draws");
+    let found = renderer.read_positions().expect("positions come back");
+    let place = Mat4::from_rotation_translation(state.head_rotation, state.head_translation);
+    let expected = deform::deform_points(&head.mesh, &head.shapes, &state.shapes);
+    assert_eq!(found.len(), expected.len());
+    for (a, b) in found.iter().zip(expected) {
+        assert!(a.distance(place.transform_point3(b)) < 1e-5 * head.height(), "{a} {b}");
+    }
+}
+
+#[test]
+fn normals_and_tangents_are_those_of_the_cpu_on_both_sides_of_a_seam() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let mut state = FaceState::neutral(&head);
+    state.shapes = vec![0.5, 1.0];
+    draw(&mut renderer, &on_gpu, &state, &[], &settings([16, 16])).expect("it draws");
+    let frames = renderer.read_surface_frames().expect("frames come back");
+    let points = deform::deform_points(&head.mesh, &head.shapes, &state.shapes);
+    let normals = deform::point_normals(&head.mesh, &points);
+    let tangents = deform::vertex_tangents(&head.mesh, &points, &normals);
+    let mut used = vec![false; head.mesh.vertices.len()];
+    head.mesh.triangles.iter().flatten().for_each(|v| used[*v as usize] = true);
+    for (i, vertex) in head.mesh.vertices.iter().enumerate().filter(|(i, _)| used[*i]) {
+        let (normal, tangent) = frames[i];
+        assert!(normal.abs_diff_eq(normals[vertex.point as usize], 1e-4), "normal {i}");
+        assert!(tangent.abs_diff_eq(tangents[i], 1e-3), "tangent {i}: {tangent} {}", tangents[i]);
+    }
+}
+
+#[test]
+fn the_same_frame_twice_is_the_same_bytes() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let state = FaceState::neutral(&head);
+    let draw = |r: &mut Renderer| draw(r, &on_gpu, &state, &[lamp()], &settings([64, 48])).expect("it draws");
+    let first = draw(&mut renderer);
+    assert_eq!(first, draw(&mut renderer));
+    assert!(first.rgba.iter().any(|b| *b > 60 && *b < 255), "there is a picture");
+}
+
+#[test]
+fn a_white_furnace_returns_what_comes_in() {
+    // Diffuse light of a uniform sky on unoccluded skin: radiance 0.5 times albedo 0.8, whatever the scattering.
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    head.maps.specular = Some(Map::filled(1, 1, &[0.0, 0.3]));
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let state = FaceState::neutral(&head);
+    let size = [65, 65];
+    draw(&mut renderer, &on_gpu, &state, &[], &settings(size)).expect("it draws");
+    let hdr = renderer.read_hdr().expect("light comes back");
+    let center = hdr[32 * 65 + 32];
+    for c in 0..3 {
+        assert!((center[c] - 0.4).abs() < 2e-3, "{center:?}");
+    }
+}
+
+#[test]
+fn blood_and_wrinkles_change_the_picture_and_zero_weights_do_not() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    // A table in which more blood is redder.
+    let texels = [[0.8, 0.7, 0.6], [0.4, 0.35, 0.3], [0.7, 0.2, 0.2], [0.3, 0.1, 0.1]];
+    let table = ColorTable { width: 2, height: 2, texels: &texels };
+    let with_maps = HeadOnGpu::new(renderer.gpu(), &head, &table).expect("the dome uploads");
+    let mut plain = dome();
+    plain.maps.distributions.clear();
+    plain.maps.zones.clear();
+    plain.maps.wrinkle_slopes.clear();
+    let without = HeadOnGpu::new(renderer.gpu(), &plain, &table).expect("the dome uploads");
+    let s = settings([48, 48]);
+    let mut picture = |head_on_gpu: &HeadOnGpu, state: &FaceState| {
+        draw(&mut renderer, head_on_gpu, state, &[lamp()], &s).expect("it draws").rgba
+    };
+    let neutral = picture(&with_maps, &FaceState::neutral(&head));
+    assert_eq!(neutral, picture(&without, &FaceState::neutral(&plain)), "zero weights are exactly neutral");
+    let middle = 4 * (24 * 48 + 24);
+    let mut blush = FaceState::neutral(&head);
+    blush.distributions = vec![1.0];
+    let flushed = picture(&with_maps, &blush);
+    assert!(flushed[middle + 1] + 5 < neutral[middle + 1], "blood takes green away");
+    let mut frown = FaceState::neutral(&head);
+    frown.zones = vec![1.0];
+    assert_ne!(neutral, picture(&with_maps, &frown));
+}
+
+#[test]
+fn wrong_settings_are_answered_in_words() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let state = FaceState::neutral(&head);
+    let mut message = |change: fn(&mut Settings), state: &FaceState| {
+        let mut s = settings([16, 16]);
+        change(&mut s);
+        draw(&mut renderer, &on_gpu, state, &[], &s).expect_err("it is refused").to_string()
+    };
+    assert!(message(|s| s.size = [0, 16], &state).contains("0x16"));
+    assert!(message(|s| s.size = [1 << 20, 16], &state).contains("1048576x16"));
+    assert!(message(|s| s.supersampling = 0, &state).contains("supersampling"));
+    assert!(message(|s| s.exposure = f32::NAN, &state).contains("exposure"));
+    let mut broken = state.clone();
+    broken.shapes.pop();
+    assert!(message(|_| {}, &broken).contains("shape weights is 1; 2"));
+    broken.shapes.push(f32::NAN);
+    assert!(message(|_| {}, &broken).contains("finite"));
+    assert!(Gpu::new(Some("no such adapter")).err().expect("refused").to_string().contains("there are"));
+}
+
+#[test]
+fn several_heads_of_one_frame_keep_apart() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let state = FaceState::neutral(&head);
+    let heads = [-0.12, 0.12].map(|x| HeadInstance {
+        head: &on_gpu,
+        state: &state,
+        world_from_head: Mat4::from_translation(Vec3::new(x, 0.0, 0.0)),
+    });
+    let scene = Scene {
+        heads: &heads,
+        camera: Camera { position: Vec3::new(0.0, 0.0, 1.0), ..CAMERA },
+        lights: &[Light { kind: LightKind::Directional { direction: Vec3::NEG_Z }, ..lamp() }],
+        environment: None,
+        environment_intensity: 0.0,
+        background_linear: Vec3::ZERO,
+    };
+    let image = renderer.render(&scene, &settings([64, 32])).expect("it draws").0;
+    let lit = |x: usize, y: usize| image.rgba[4 * (y * 64 + x) + 1] > 40;
+    assert!(lit(23, 16) && lit(41, 16), "both are there");
+    assert!(!lit(32, 2), "the sky between them is empty");
+}
