@@ -9,14 +9,18 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod adapters;
+mod chart;
+mod compare;
 mod contact_sheet;
 mod demo;
 mod failure;
 mod filter;
 mod import;
 mod inputs;
+mod kernel;
 mod maps;
 mod output;
+mod profile;
 mod progress;
 mod render;
 mod schema;
@@ -46,6 +50,14 @@ enum Command {
     Maps(maps::MapsArgs),
     /// Antialias images
     Filter(filter::Arguments),
+    /// Measure how far two images or two folders of images are apart
+    Compare(compare::Arguments),
+    /// Chart the cost and the error of scattering methods
+    Chart(chart::Arguments),
+    /// Print a diffusion profile: R(r), Gaussians, transmittance
+    Profile(profile::Arguments),
+    /// Print a separable kernel of a profile
+    Kernel(kernel::Arguments),
     /// List the graphics adapters of this machine
     Adapters(adapters::Arguments),
     /// Print the JSON schema of a rig or a sequence
@@ -59,6 +71,10 @@ fn main() -> ExitCode {
         Command::Import(a) => import::run(&a),
         Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
         Command::Filter(a) => filter::run(&a),
+        Command::Compare(a) => compare::run(&a),
+        Command::Chart(a) => chart::run(&a),
+        Command::Profile(a) => profile::run(&a),
+        Command::Kernel(a) => kernel::run(&a),
         Command::Adapters(a) => adapters::run(&a),
         Command::Schema(a) => schema::run(&a),
     };
