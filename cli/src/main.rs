@@ -10,6 +10,8 @@ use clap::{Parser, Subcommand};
 
 mod adapters;
 mod capture;
+mod chart;
+mod compare;
 mod contact_sheet;
 mod demo;
 mod failure;
@@ -17,9 +19,11 @@ mod filter;
 mod gallery;
 mod import;
 mod inputs;
+mod kernel;
 mod maps;
 mod maya;
 mod output;
+mod profile;
 mod progress;
 mod render;
 mod schema;
@@ -53,6 +57,14 @@ enum Command {
     Maya(maya::Arguments),
     /// Antialias images
     Filter(filter::Arguments),
+    /// Measure how far two images or two folders of images are apart
+    Compare(compare::Arguments),
+    /// Chart the cost and the error of scattering methods
+    Chart(chart::Arguments),
+    /// Print a diffusion profile: R(r), Gaussians, transmittance
+    Profile(profile::Arguments),
+    /// Print a separable kernel of a profile
+    Kernel(kernel::Arguments),
     /// List the graphics adapters of this machine
     Adapters(adapters::Arguments),
     /// Print the JSON schema of a rig or a sequence
@@ -68,6 +80,10 @@ fn main() -> ExitCode {
         Command::Maya(a) => maya::run(&a),
         Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
         Command::Filter(a) => filter::run(&a),
+        Command::Compare(a) => compare::run(&a),
+        Command::Chart(a) => chart::run(&a),
+        Command::Profile(a) => profile::run(&a),
+        Command::Kernel(a) => kernel::run(&a),
         Command::Adapters(a) => adapters::run(&a),
         Command::Schema(a) => schema::run(&a),
     };

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
-use crate::head::GpuVertex;
+use crate::head::{GpuVertex, HeadOnGpu};
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::{Appearance, Blended};
 use crate::passes::compose::Compose;
@@ -61,12 +61,12 @@ pub struct Image {
 pub struct FrameStats {
     /// GPU milliseconds of each pass, in order; empty where the adapter has no timestamps.
     pub passes_ms: Vec<(&'static str, f64)>,
-    /// Relative standard error of the light that `reference-surface` integrated; `None` for other methods.
-    pub scatter_noise: Option<f64>,
     /// Triangles of all heads.
     pub triangles: u64,
     /// Bytes of heads, buffers and images on the device.
     pub memory_bytes: u64,
+    /// Relative standard error of the diffuse light, for `reference-surface`.
+    pub scatter_noise: Option<f64>,
 }
 
 /// The view as view.wgsl reads it.
@@ -308,6 +308,10 @@ impl Renderer {
             let table = Transmittance::new(&self.gpu, &settings.profile)?;
             self.transmittance = Some((settings.profile.clone(), table));
         }
+        if matches!(settings.scatter, ScatterMethod::ReferenceSurface(_)) {
+            self.shade.prepare_samples(&self.gpu);
+        }
+        self.is_scattered = settings.scatter != ScatterMethod::None;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let scatter_noise = self.record_frame(&mut encoder, scene, settings)?;
         self.gpu.queue.submit([encoder.finish()]);
@@ -456,271 +460,163 @@ impl Renderer {
         }
     }
 
-    /// Every pass of a frame, in order. Returns the noise of `reference-surface`, if that scattered the light.
+    /// Every pass of a frame, in order.
     fn record_frame(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         scene: &Scene<'_>,
         settings: &Settings,
     ) -> Result<Option<f64>, RenderError> {
-        let lights = self.record_geometry(encoder, scene);
-        let subsamples = settings.antialias.mode.subsamples(self.past.frames);
-        let share = 1.0 / subsamples.len() as f32;
-        let shading_jitter = subsamples
-            .iter()
-            .fold([0.0; 2], |sum, s| [sum[0] - share * s.position_px[0], sum[1] - share * s.position_px[1]]);
-        let mut noise = None;
-        for (sample, subsample) in subsamples.iter().enumerate() {
-            // A camera reaches a place in the pixel by moving the image the other way.
-            let jitter = subsample.position_px.map(|p| -p);
-            let view =
-                view(scene, settings.frame_size(), [jitter, shading_jitter], self.past.clip_from_world);
-            let view = self.gpu.uniform("view", &view);
-            self.record_light(encoder, scene, settings, &view, &lights, sample);
-            if let ScatterMethod::ReferenceSurface(batches) = settings.scatter {
-                let next = self.gpu.device.create_command_encoder(&Default::default());
-                self.gpu.queue.submit([std::mem::replace(encoder, next).finish()]);
-                noise = self.integrate_surface(encoder, scene, settings, &view, &lights, batches, sample)?;
-            }
-            self.record_picture(encoder, scene, settings, &view, sample);
-        }
-        self.record_antialias(encoder, scene, settings)?;
-        self.timer.resolve(encoder);
-        Ok(noise)
-    }
-
-    /// What all samples of a frame share: deformation, colour and wrinkles of the moment, shadow maps.
-    fn record_geometry(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        scene: &Scene<'_>,
-    ) -> [GpuLight; MAX_LIGHTS] {
         let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let Some(targets) = &self.targets else { return bytemuck::Zeroable::zeroed() };
-        timer.restart();
-        let heads = scene.heads.iter().zip(&self.instances);
-        for (instance, buffers) in heads.clone() {
-            let (head, state) = (instance.head, instance.state);
-            let weights = gpu.storage("shape weights", &state.shapes);
-            let place = world_from_head(instance);
-            self.morph.record(gpu, encoder, timer, head, place, &weights, &buffers.positions);
-            self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
-            if let Some(maps) = &head.maps {
-                let (distributions, zones) = (&state.distributions, &state.zones);
-                self.appearance.record(gpu, encoder, timer, maps, distributions, zones, &buffers.blended);
-            }
-        }
-        let drawn: Vec<_> = heads.map(|(h, i)| (h.head, &i.positions)).collect();
-        let (lights, layers) = place_lights(scene, &targets.shadows);
-        for (light, layer) in &layers {
-            self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
-        }
-        lights
-    }
-
-    /// What a sample of each pixel sees, and the light on it.
-    fn record_light(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        scene: &Scene<'_>,
-        settings: &Settings,
-        view: &wgpu::Buffer,
-        lights: &[GpuLight; MAX_LIGHTS],
-        sample: usize,
-    ) {
-        let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let Some(targets) = &self.targets else { return };
-        let images = &targets.samples[sample];
-        let heads = scene.heads.iter().zip(&self.instances);
-        let drawn: Vec<_> = heads.clone().map(|(h, i)| (h.head, &i.positions)).collect();
-        self.visibility.record(gpu, encoder, timer, view, &drawn, &images.ids, &images.depth);
-
-        let shadows = crate::texture::array_of(&targets.shadows);
+        let Some(targets) = &self.targets else { return Ok(None) };
+        let mut scatter_noise = None;
         let transmittance = match (settings.transmit, settings.scatter) {
             // The integral over the surface holds the light from behind.
             (TransmitMethod::None, _) | (_, ScatterMethod::ReferenceSurface(_)) => None,
             (TransmitMethod::ShadowDepth, _) => self.transmittance.as_ref().map(|(_, t)| t),
         };
-        let lighting = lighting(scene, view, lights, targets, sample, &shadows, transmittance);
-        let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
-        for (index, (instance, buffers)) in heads.clone().enumerate() {
-            let shaded = shaded(index, instance, buffers);
-            self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
-        }
-        if let Some(velocity) = targets.velocity.as_ref().filter(|_| sample == 0) {
-            // The first frame has nothing before it: its positions stand for the previous ones.
-            let known = self.past.clip_from_world.is_some();
-            let moving: Vec<_> = heads
-                .map(|(h, i)| Moving {
-                    head: h.head,
-                    positions: &i.positions,
-                    previous_positions: if known { &i.previous_positions } else { &i.positions },
-                })
-                .collect();
-            self.velocity.record(gpu, encoder, timer, view, &moving, &images.ids, velocity);
-        }
-    }
+        timer.restart();
+        let heads: Vec<(&HeadOnGpu, &Instance)> =
+            scene.heads.iter().map(|h| h.head).zip(&self.instances).collect();
+        let drawn: Vec<_> = heads.iter().map(|(h, i)| (*h, &i.positions)).collect();
 
-    /// The reference method, which waits for the device between batches.
-    fn integrate_surface(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        scene: &Scene<'_>,
-        settings: &Settings,
-        view: &wgpu::Buffer,
-        lights: &[GpuLight; MAX_LIGHTS],
-        batches: u32,
-        sample: usize,
-    ) -> Result<Option<f64>, RenderError> {
-        self.shade.prepare_samples(&self.gpu);
-        let gpu = &self.gpu;
-        let Some(targets) = &self.targets else { return Ok(None) };
-        let shadows = crate::texture::array_of(&targets.shadows);
-        let lighting = lighting(scene, view, lights, targets, sample, &shadows, None);
-        let inputs = surface::Inputs {
-            view,
-            ids: &targets.samples[sample].ids,
-            irradiance: &targets.irradiance,
-            depth: &targets.samples[sample].depth,
-            scattered: &targets.scattered,
-        };
-        let integral = Surface::new(gpu, &settings.profile, targets.size);
-        let aspect = targets.size[0] as f32 / targets.size[1] as f32;
-        let clip_from_world = scene.camera.clip_from_view(aspect) * scene.camera.view_from_world();
-        for (index, (instance, buffers)) in scene.heads.iter().zip(&self.instances).enumerate() {
-            let head = instance.head;
-            let triangles: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.triangles)?);
-            let vertices: Vec<GpuVertex> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.vertices)?);
-            let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&buffers.positions)?);
-            let points: Vec<Vec3> = points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect();
-            let point_of_vertex: Vec<u32> = vertices.iter().map(|v| v.point).collect();
-            let opaque = &triangles[..head.opaque_triangles as usize];
-            let skin = Skin::new(opaque, &point_of_vertex, &points, &clip_from_world, PICTURE_MARGIN);
-            let shaded = shaded(index, instance, buffers);
-            integral.add_head(gpu, &inputs, index as u32, &skin, batches, &mut |e, samples, light| {
-                let count = surface::BATCH as u32;
-                self.shade.record_samples(gpu, e, &lighting, &shaded, [samples, light], count);
-            })?;
-        }
-        integral.record_finish(gpu, encoder, &mut self.timer, &inputs);
-        integral.relative_noise(gpu)
-    }
-
-    /// From the light on a sample of each pixel to its displayed colour.
-    fn record_picture(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        scene: &Scene<'_>,
-        settings: &Settings,
-        view: &wgpu::Buffer,
-        sample: usize,
-    ) {
-        let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let Some(targets) = &self.targets else { return };
-        let sample = &targets.samples[sample];
-        let images = Images {
-            irradiance: &targets.irradiance,
-            depth: &sample.depth,
-            scratch: &targets.scratch,
-            scattered: &targets.scattered,
-        };
-        let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view };
-        let diffuse = match settings.scatter {
-            ScatterMethod::ReferenceSurface(_) => &targets.scattered,
-            _ => self.scatter.record(recorder, &images),
-        };
-        self.is_scattered = settings.scatter != ScatterMethod::None;
-
-        let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
-        self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
-        let overlays: Vec<_> = scene
-            .heads
-            .iter()
-            .zip(&self.instances)
-            .filter(|(h, _)| h.head.overlay_triangles > 0)
-            .map(|(h, i)| (h.head, &i.positions, &i.frames))
-            .collect();
-        if !overlays.is_empty() {
-            let ambient = average_light(scene);
-            let images = [&sample.depth, &targets.hdr];
-            self.overlay.record(gpu, encoder, timer, view, ambient, &overlays, images);
-        }
-        let (exposure, samples) = (settings.exposure, settings.supersampling);
-        self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
-    }
-
-    /// From displayed samples to the image.
-    fn record_antialias(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        scene: &Scene<'_>,
-        settings: &Settings,
-    ) -> Result<(), RenderError> {
-        let (gpu, timer) = (&self.gpu, &mut self.timer);
-        let (Some(targets), Some(antialias)) = (&self.targets, &self.antialias) else { return Ok(()) };
-        let colors: Vec<_> = targets.samples.iter().map(|s| &s.displayed).collect();
-        let depths: Vec<_> = targets.samples.iter().map(|s| &s.depth).collect();
-        let inputs = antialias::Inputs {
-            colors: &colors,
-            depths: if settings.antialias.needs_depth() { &depths } else { &[] },
-            velocity: targets.velocity.as_ref(),
-            frame: self.past.frames,
-        };
-        let image = targets.image.create_view(&Default::default());
-        let is_temporal = settings.antialias.mode.is_temporal();
-        if is_temporal && self.past.history.is_none() {
-            self.past.history = Some(History::new(gpu, settings.size));
-        }
-        let history = if is_temporal { self.past.history.as_mut() } else { None };
-        antialias.record(gpu, encoder, timer, &inputs, &image, history)?;
-        if is_temporal {
-            for buffers in self.instances.iter().take(scene.heads.len()) {
-                let (from, to) = (&buffers.positions, &buffers.previous_positions);
-                encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+        for (instance, (head, buffers)) in scene.heads.iter().zip(&heads) {
+            let weights = gpu.storage("shape weights", &instance.state.shapes);
+            let place = world_from_head(instance);
+            self.morph.record(gpu, encoder, timer, head, place, &weights, &buffers.positions);
+            self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
+            if let Some(maps) = &head.maps {
+                let state = instance.state;
+                let (distributions, zones) = (&state.distributions, &state.zones);
+                self.appearance.record(gpu, encoder, timer, maps, distributions, zones, &buffers.blended);
             }
-            let aspect = targets.size[0] as f32 / targets.size[1] as f32;
-            let camera = &scene.camera;
-            self.past.clip_from_world = Some(camera.clip_from_view(aspect) * camera.view_from_world());
-            self.past.frames += 1;
         }
-        Ok(())
-    }
-}
 
-/// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
-const PICTURE_MARGIN: f32 = 1.25;
+        let (lights, layers) = place_lights(scene, &targets.shadows);
+        for (light, layer) in &layers {
+            self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
+        }
+        let shadows = crate::texture::array_view_of(&targets.shadows);
 
-fn lighting<'a>(
-    scene: &Scene<'a>,
-    view: &'a wgpu::Buffer,
-    lights: &[GpuLight; MAX_LIGHTS],
-    targets: &'a Targets,
-    sample: usize,
-    shadows: &'a wgpu::TextureView,
-    transmittance: Option<&'a Transmittance>,
-) -> Lighting<'a> {
-    let first = &targets.samples[0];
-    Lighting {
-        view,
-        lights: *lights,
-        shadows,
-        environment: scene.environment,
-        environment_intensity: scene.environment_intensity,
-        ids: &targets.samples[sample].ids,
-        depth: &targets.samples[sample].depth,
-        first: (sample > 0).then_some((&first.ids, &first.depth)),
-        transmittance,
-    }
-}
+        let subsamples = settings.antialias.mode.subsamples(self.past.frames);
+        let share = 1.0 / subsamples.len() as f32;
+        let shading_jitter = subsamples
+            .iter()
+            .fold([0.0; 2], |sum, s| [sum[0] - share * s.position_px[0], sum[1] - share * s.position_px[1]]);
+        for (sample, subsample) in targets.samples.iter().zip(subsamples) {
+            let first = &targets.samples[0];
+            // A camera reaches a place in the pixel by moving the image the other way.
+            let jitter = subsample.position_px.map(|p| -p);
+            let view = view(scene, targets.size, [jitter, shading_jitter], self.past.clip_from_world);
+            let view = gpu.uniform("view", &view);
+            self.visibility.record(gpu, encoder, timer, &view, &drawn, &sample.ids, &sample.depth);
 
-fn shaded<'a>(index: usize, instance: &crate::scene::HeadInstance<'a>, buffers: &'a Instance) -> Shaded<'a> {
-    Shaded {
-        index: index as u32,
-        head: instance.head,
-        positions: &buffers.positions,
-        frames: &buffers.frames,
-        blended: &buffers.blended,
-        hemoglobin_scale: instance.state.hemoglobin_scale,
+            let lighting = Lighting {
+                view: &view,
+                lights,
+                shadows: &shadows,
+                environment: scene.environment,
+                environment_intensity: scene.environment_intensity,
+                ids: &sample.ids,
+                depth: &sample.depth,
+                transmittance,
+                first: (!std::ptr::eq(sample, first)).then_some((&first.ids, &first.depth)),
+            };
+            let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
+            for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
+                let shaded = shaded(index, instance, head, buffers);
+                self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
+            }
+
+            let images = Images {
+                irradiance: &targets.irradiance,
+                depth: &sample.depth,
+                scratch: &targets.scratch,
+                scattered: &targets.scattered,
+            };
+            let diffuse = match settings.scatter {
+                ScatterMethod::ReferenceSurface(batches) => {
+                    let integral = Surface::new(gpu, &settings.profile, targets.size);
+                    let inputs = surface::Inputs {
+                        view: &view,
+                        ids: &sample.ids,
+                        irradiance: &targets.irradiance,
+                        depth: &sample.depth,
+                        scattered: &targets.scattered,
+                    };
+                    // The sums need the light of this frame: the device works on it while samples are drawn.
+                    let fresh = gpu.device.create_command_encoder(&Default::default());
+                    gpu.queue.submit([std::mem::replace(encoder, fresh).finish()]);
+                    integrate(gpu, &self.shade, scene, &heads, &lighting, &integral, &inputs, batches)?;
+                    integral.record_finish(gpu, encoder, timer, &inputs);
+                    scatter_noise = integral.relative_noise(gpu)?;
+                    &targets.scattered
+                }
+                _ => {
+                    let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view: &view };
+                    self.scatter.record(recorder, &images)
+                }
+            };
+
+            let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
+            self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
+            let overlays: Vec<_> = heads
+                .iter()
+                .filter(|(h, _)| h.overlay_triangles > 0)
+                .map(|(h, i)| (*h, &i.positions, &i.frames))
+                .collect();
+            if !overlays.is_empty() {
+                let ambient = average_light(scene);
+                let images = [&sample.depth, &targets.hdr];
+                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
+            }
+
+            let (exposure, samples) = (settings.exposure, settings.supersampling);
+            self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
+            if let Some(velocity) = targets.velocity.as_ref().filter(|_| std::ptr::eq(sample, first)) {
+                // The first frame has nothing before it: its positions stand for the previous ones.
+                let known = self.past.clip_from_world.is_some();
+                let moving: Vec<_> = heads
+                    .iter()
+                    .map(|(head, i)| Moving {
+                        head,
+                        positions: &i.positions,
+                        previous_positions: if known { &i.previous_positions } else { &i.positions },
+                    })
+                    .collect();
+                self.velocity.record(gpu, encoder, timer, &view, &moving, &sample.ids, velocity);
+            }
+        }
+
+        if let Some(antialias) = &self.antialias {
+            let colors: Vec<_> = targets.samples.iter().map(|s| &s.displayed).collect();
+            let depths: Vec<_> = targets.samples.iter().map(|s| &s.depth).collect();
+            let inputs = antialias::Inputs {
+                colors: &colors,
+                depths: if settings.antialias.needs_depth() { &depths } else { &[] },
+                velocity: targets.velocity.as_ref(),
+                frame: self.past.frames,
+            };
+            let image = targets.image.create_view(&Default::default());
+            let is_temporal = settings.antialias.mode.is_temporal();
+            if is_temporal && self.past.history.is_none() {
+                self.past.history = Some(History::new(gpu, settings.size));
+            }
+            let history = if is_temporal { self.past.history.as_mut() } else { None };
+            antialias.record(gpu, encoder, timer, &inputs, &image, history)?;
+            if is_temporal {
+                for (_, buffers) in &heads {
+                    let (from, to) = (&buffers.positions, &buffers.previous_positions);
+                    encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+                }
+                let aspect = targets.size[0] as f32 / targets.size[1] as f32;
+                let camera = &scene.camera;
+                self.past.clip_from_world = Some(camera.clip_from_view(aspect) * camera.view_from_world());
+                self.past.frames += 1;
+            }
+        }
+        timer.resolve(encoder);
+        Ok(scatter_noise)
     }
 }
 
@@ -752,6 +648,56 @@ fn view(
         light_count: scene.lights.len() as u32,
         shading_jitter,
         padding: [0.0; 2],
+    }
+}
+
+/// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
+const PICTURE_MARGIN: f32 = 1.25;
+
+/// Adds all heads to the integral of `reference-surface`.
+fn integrate(
+    gpu: &Gpu,
+    shade: &Shade,
+    scene: &Scene<'_>,
+    heads: &[(&HeadOnGpu, &Instance)],
+    lighting: &Lighting<'_>,
+    integral: &Surface,
+    inputs: &surface::Inputs<'_>,
+    batches: u32,
+) -> Result<(), RenderError> {
+    let size = inputs.scattered.texture().size();
+    let aspect = size.width as f32 / size.height as f32;
+    let clip_from_world = scene.camera.clip_from_view(aspect) * scene.camera.view_from_world();
+    for (index, (instance, (head, buffers))) in scene.heads.iter().zip(heads).enumerate() {
+        let triangles: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.triangles)?);
+        let vertices: Vec<GpuVertex> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&head.vertices)?);
+        let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_buffer(&buffers.positions)?);
+        let points: Vec<Vec3> = points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect();
+        let point_of_vertex: Vec<u32> = vertices.iter().map(|v| v.point).collect();
+        let opaque = &triangles[..head.opaque_triangles as usize];
+        let skin = Skin::new(opaque, &point_of_vertex, &points, &clip_from_world, PICTURE_MARGIN);
+        let shaded = shaded(index, instance, head, buffers);
+        integral.add_head(gpu, inputs, index as u32, &skin, batches, &mut |encoder, samples, light| {
+            let count = surface::BATCH as u32;
+            shade.record_samples(gpu, encoder, lighting, &shaded, [samples, light], count);
+        })?;
+    }
+    Ok(())
+}
+
+fn shaded<'a>(
+    index: usize,
+    instance: &crate::scene::HeadInstance<'_>,
+    head: &'a HeadOnGpu,
+    buffers: &'a Instance,
+) -> Shaded<'a> {
+    Shaded {
+        index: index as u32,
+        head,
+        positions: &buffers.positions,
+        frames: &buffers.frames,
+        blended: &buffers.blended,
+        hemoglobin_scale: instance.state.hemoglobin_scale,
     }
 }
 

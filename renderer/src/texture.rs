@@ -102,11 +102,11 @@ fn upload<T: bytemuck::Pod>(
 
 /// The same texture seen as an array, whatever its number of layers.
 pub(crate) fn array_view(view: &wgpu::TextureView) -> wgpu::TextureView {
-    array_of(view.texture())
+    array_view_of(view.texture())
 }
 
-/// All layers of a texture as an array.
-pub(crate) fn array_of(texture: &wgpu::Texture) -> wgpu::TextureView {
+/// A texture as an array, whatever its number of layers.
+pub(crate) fn array_view_of(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor {
         dimension: Some(wgpu::TextureViewDimension::D2Array),
         ..Default::default()

@@ -8,6 +8,7 @@ use rubor_rig::skin::profile::{Profile, RadialProfile};
 use super::reference::Frame;
 use super::*;
 use crate::frame::View;
+use crate::testing::gpu;
 
 /// Distance of the near plane of test views, metres.
 const NEAR: f32 = 0.01;
@@ -31,18 +32,6 @@ impl Random {
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;
         (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
-/// A device, or a loud note why there is none.
-fn gpu() -> Option<Gpu> {
-    match Gpu::new(None) {
-        Ok(gpu) => Some(gpu),
-        Err(e) if std::env::var_os("RUBOR_REQUIRE_GPU").is_some() => panic!("{e}"),
-        Err(e) => {
-            eprintln!("SKIPPED: no graphics adapter, so the scattering passes were not run: {e}");
-            None
-        }
     }
 }
 

@@ -396,11 +396,11 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
         environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
         has_maps: u32::from(maps.is_some()),
         wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
+        is_second_sample: u32::from(lighting.first.is_some()),
+        padding: [0; 3],
         transmit: lighting
             .transmittance
             .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),
-        is_second_sample: u32::from(lighting.first.is_some()),
-        padding: [0; 3],
         hair_color: maps.map_or([0.0; 4], |m| {
             let [r, g, b] = m.hair_color_linear;
             [r, g, b, 1.0]

@@ -23,6 +23,9 @@ use rubor_rig::skin::profile::Profile;
 use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
 
+#[cfg(test)]
+mod tests;
+
 /// Samples of a batch.
 pub(crate) const BATCH: usize = 65_536;
 /// Entries of the table of R.
@@ -96,16 +99,18 @@ impl Skin {
         margin: f32,
     ) -> Self {
         let skin = Material::ALL.iter().position(|m| *m == Material::Skin).unwrap_or(0) as u32;
-        let in_picture = |p: &Vec3| {
-            let c = *clip_from_world * p.extend(1.0);
-            c.w <= 0.0 || (c.x.abs() <= margin * c.w && c.y.abs() <= margin * c.w)
+        // Beyond one side of the widened picture with all corners, and before the camera.
+        let is_outside = |corners: &[Vec3; 3]| {
+            let c = corners.map(|p| *clip_from_world * p.extend(1.0));
+            let beyond = |f: &dyn Fn(glam::Vec4) -> f32| c.iter().all(|c| c.w > 0.0 && f(*c) > margin * c.w);
+            beyond(&|c| c.x) || beyond(&|c| -c.x) || beyond(&|c| c.y) || beyond(&|c| -c.y)
         };
         let mut chosen = Vec::new();
         let (mut area_mm2, mut sum) = (Vec::new(), 0.0);
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         for (i, t) in triangles.iter().enumerate().filter(|(_, t)| t[3] == skin) {
             let corners = [t[0], t[1], t[2]].map(|v| points[point_of_vertex[v as usize] as usize]);
-            if !corners.iter().any(in_picture) {
+            if is_outside(&corners) {
                 continue;
             }
             let cross = (corners[1] - corners[0]).as_dvec3().cross((corners[2] - corners[0]).as_dvec3());

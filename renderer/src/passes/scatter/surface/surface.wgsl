@@ -58,7 +58,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let center = textureLoad(irradiance, id.xy, 0);
-    let ray = pixel_ray(view, vec2f(id.xy) + 0.5);
+    let ray = pixel_ray(view, vec2f(id.xy) + 0.5, view.jitter);
     let metres = view.origin.xyz - params.origin + ray * view_depth(view, textureLoad(depth, id.xy, 0));
     let p = 1e3 * metres;
     let reach = params.half_width_mm * center.a;
