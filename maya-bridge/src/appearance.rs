@@ -13,6 +13,13 @@ use rubor_rig::head::{Distribution, Head, Material, Provenance, SkinMaps, Wrinkl
 use rubor_rig::map::Map;
 use serde::{Deserialize, Serialize};
 
+/// Name and content of a file beside the scene.
+pub(crate) type NamedFile = (String, Vec<u8>);
+/// A map that cannot be encoded, and why.
+pub(crate) type Unencodable = (String, String);
+/// PNG, and offset and scale of each channel.
+type Encoded = (Vec<u8>, Vec<f32>, Vec<f32>);
+
 /// Version of the layout.
 const VERSION: u32 = 1;
 
@@ -62,7 +69,7 @@ pub(crate) struct MapEntry {
 
 impl Appearance {
     /// Entries of a head; maps go to files named `stem_role.png`, returned with their bytes.
-    pub(crate) fn of(head: &Head, stem: &str) -> Result<(Self, Vec<(String, Vec<u8>)>), (String, String)> {
+    pub(crate) fn of(head: &Head, stem: &str) -> Result<(Self, Vec<NamedFile>), Unencodable> {
         let mut appearance = Self {
             version: VERSION,
             name: head.name.clone(),
@@ -88,7 +95,7 @@ impl Appearance {
             files.push((file.clone(), bytes));
             let entry = MapEntry { role: role.into(), name: name.into(), wrinkle_map, file, offset, scale };
             appearance.maps.push(entry);
-            Ok::<(), (String, String)>(())
+            Ok::<(), Unencodable>(())
         };
         let single = [
             ("melanin", &maps.melanin),
@@ -167,7 +174,7 @@ impl Appearance {
 }
 
 /// 16-bit PNG of a map over its own range, channels below each other.
-fn encode(map: &Map) -> Result<(Vec<u8>, Vec<f32>, Vec<f32>), String> {
+fn encode(map: &Map) -> Result<Encoded, String> {
     let channels = map.channels as usize;
     let mut bytes = Vec::with_capacity(map.values.len() * 2);
     let (mut offsets, mut scales) = (Vec::new(), Vec::new());

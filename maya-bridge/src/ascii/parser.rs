@@ -199,7 +199,7 @@ impl<'a> Parser<'a> {
         }
         self.lexer.skip_statement()?;
         let data = match kind.as_str() {
-            "transform" | "joint" => Data::Transform(Transform::default()),
+            "transform" | "joint" => Data::Transform(Box::default()),
             "mesh" => Data::Mesh(Box::<MeshData>::default()),
             "blendShape" => Data::BlendShape(Box::<BlendShapeData>::default()),
             "animCurveTL" | "animCurveTA" | "animCurveTU" => Data::Curve(Box::<CurveData>::default()),

@@ -18,7 +18,7 @@ pub(crate) struct Node {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Data {
-    Transform(Transform),
+    Transform(Box<Transform>),
     Mesh(Box<MeshData>),
     BlendShape(Box<BlendShapeData>),
     Curve(Box<CurveData>),

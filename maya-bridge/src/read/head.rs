@@ -269,7 +269,8 @@ impl Assembly<'_> {
             } else {
                 let weight = (f64::from(item) - 5000.0) / 1000.0;
                 let shape = named.get(&target).cloned().unwrap_or_else(|| alias.clone());
-                if !(weight > 0.0 && weight < 1.0) || !named.contains_key(&target) {
+                let between = weight > 0.0 && weight < 1.0;
+                if !between || !named.contains_key(&target) {
                     notes.push(format!(
                         "{}: the target of {shape} at weight {weight} was left out; in-betweens stand between 0 and 1",
                         scene.nodes[node].name

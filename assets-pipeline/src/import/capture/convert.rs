@@ -84,7 +84,7 @@ pub fn to_sequence(
     let mut routes: Vec<(usize, Vec<ShapeTarget>)> = Vec::new();
     for (index, channel) in recording.channels.iter().enumerate() {
         let targets = match (retarget.targets(&channel.name), canonical(&channel.name)) {
-            (Some(targets), _) if targets.is_empty() => {
+            (Some([]), _) => {
                 report.left_out.push(channel.name.clone());
                 continue;
             }

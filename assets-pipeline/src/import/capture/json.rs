@@ -308,8 +308,9 @@ fn euler(value: &Value) -> Option<[f32; 3]> {
     };
     let axes = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3::normalize_or_zero);
     let rotation = Mat3::from_cols(axes[0], axes[1], axes[2]);
-    let stretch = (rotation.determinant() - 1.0).abs();
-    if stretch.is_nan() || stretch >= 0.1 {
+    // A determinant that is no number is no rotation either.
+    let proper = (rotation.determinant() - 1.0).abs() < 0.1;
+    if !proper {
         return None;
     }
     let (yaw, pitch, roll) = Quat::from_mat3(&rotation).to_euler(EulerRot::YXZ);
