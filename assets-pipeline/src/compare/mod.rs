@@ -60,7 +60,7 @@ mod tests {
         let expected = (0.01 / 1.01 + 2.0 * 0.04 / 4.01) / 3.0;
         assert!((rel_mse(&test, &reference) - expected).abs() < 1e-7);
         assert_eq!(relative_rmse(&reference, &reference), 0.0);
-        assert_eq!(relative_rmse(&reference, &vec![[0.0; 3]; 4]), f64::INFINITY);
+        assert_eq!(relative_rmse(&reference, &[[0.0; 3]; 4]), f64::INFINITY);
         let map: Vec<f32> = (0..=100).map(|i| i as f32).collect();
         assert_eq!(mean_and_percentile(&map), (50.0, 99.0));
         assert_eq!(mean_and_percentile(&[]), (0.0, 0.0));

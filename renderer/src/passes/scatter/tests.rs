@@ -225,7 +225,7 @@ fn separable_agrees_with_its_equations() {
         let side = separable::side(&kernel);
         let width = kernel.half_width_mm();
         let expected = frame.line(&side, width, 0).line(&side, width, 1);
-        let found = run(&gpu, ScatterMethod::Separable(samples as u32), &skin(), &frame);
+        let found = run(gpu, ScatterMethod::Separable(samples as u32), &skin(), &frame);
         // Two roundings to half: one between the passes.
         assert_close("separable", &found, &expected, 3e-3);
     }
@@ -242,8 +242,8 @@ fn tiles_give_what_the_images_give() {
         let frame = Frame { focal_px: focal, ..hostile(4) };
         for vertical in [false, true] {
             let [tiled, untiled] = [true, false].map(|tiled| {
-                let line = line::Line::with_tiles(&gpu, vertical, false, tiled);
-                run_with(&gpu, &frame, |r, i| {
+                let line = line::Line::with_tiles(gpu, vertical, false, tiled);
+                run_with(gpu, &frame, |r, i| {
                     let step = [i.irradiance, i.scattered];
                     line.record(r.gpu, r.encoder, r.timer, r.view, &params, i.depth, step, None);
                 })
@@ -270,7 +270,7 @@ fn gaussians_agree_with_their_equations() {
             blurred = blurred.line(&taps, step.deviation_mm, 0).line(&taps, step.deviation_mm, 1);
             sum = sum.mix(&blurred, step.share);
         }
-        let found = run(&gpu, ScatterMethod::ScreenGauss(terms as u32), &profile, &frame);
+        let found = run(gpu, ScatterMethod::ScreenGauss(terms as u32), &profile, &frame);
         assert_close("screen-gauss", &found, &sum, 6e-3);
     }
 }
@@ -293,7 +293,7 @@ fn jitter_agrees_with_its_equations() {
     let frame = hostile(6);
     let taps = jitter::taps(&skin());
     let width = taps.iter().map(|t| f64::from(t.place[0].hypot(t.place[1]))).fold(0.0, f64::max);
-    let found = run(&gpu, ScatterMethod::ScreenJitter, &skin(), &frame);
+    let found = run(gpu, ScatterMethod::ScreenJitter, &skin(), &frame);
     assert_close("screen-jitter", &found, &frame.jitter(&taps, width), 2e-3);
 }
 
@@ -319,7 +319,7 @@ fn the_exact_kernel_agrees_with_integrals_over_pixels() {
         depth_mm: (0..99).map(|i| frame.depth_mm[(i / 9) * 27 + i % 9]).collect(),
         ..frame
     };
-    let found = run(&gpu, ScatterMethod::ReferenceScreen, &profile, &corner);
+    let found = run(gpu, ScatterMethod::ReferenceScreen, &profile, &corner);
     // Linear interpolation in the table, 0.006 mm between entries where a Gaussian has 0.08 mm.
     assert_close("reference-screen", &found, &corner.exact(exact::half_width_mm(&profile), &light), 1e-2);
 }
@@ -330,7 +330,7 @@ fn even_light_on_a_plane_stays_even() {
     for method in METHODS {
         for tilt in [0.0, 0.3, -1.5] {
             let frame = Frame::new([51, 27], 800.0, |x, _| ([0.7, 1.5, 0.1], 1.0, 400.0 + tilt * x as f64));
-            for pixel in run(&gpu, method, &skin(), &frame) {
+            for pixel in run(gpu, method, &skin(), &frame) {
                 for (found, expected) in pixel.iter().zip([0.7, 1.5, 0.1]) {
                     assert_eq!(*found, half(expected), "{method} {tilt}: {pixel:?}");
                 }
@@ -347,7 +347,7 @@ fn energy_on_a_plane_is_kept() {
             let lit = (x as f64 - 47.5).hypot(y as f64 - 47.5) < 12.0;
             ([f64::from(u8::from(lit)); 3], 1.0, 400.0)
         });
-        let found = run(&gpu, method, &skin(), &frame);
+        let found = run(gpu, method, &skin(), &frame);
         for c in 0..3 {
             let before: f64 = frame.color.iter().map(|p| p[c]).sum();
             let after: f64 = found.iter().map(|p| p[c]).sum();
@@ -374,7 +374,7 @@ fn mirrored_light_scatters_mirrored() {
     for method in
         [ScatterMethod::Separable(17), ScatterMethod::ScreenGauss(6), ScatterMethod::ReferenceScreen]
     {
-        let [a, b] = [false, true].map(|flip| run(&gpu, method, &skin(), &frame(flip)));
+        let [a, b] = [false, true].map(|flip| run(gpu, method, &skin(), &frame(flip)));
         for y in 0..27 {
             for x in 0..51 {
                 let (p, q) = (a[y * 51 + x], b[y * 51 + 50 - x]);
@@ -392,7 +392,7 @@ fn no_strength_changes_nothing() {
     let Some(gpu) = gpu() else { return };
     for method in METHODS {
         let frame = Frame { strength: vec![0.0; 27 * 51], ..hostile(8) };
-        let found = run(&gpu, method, &skin(), &frame);
+        let found = run(gpu, method, &skin(), &frame);
         for (f, e) in found.iter().zip(&frame.color) {
             assert_eq!([f[0], f[1], f[2], f[3]], [e[0], e[1], e[2], 0.0], "{method}");
         }
@@ -406,7 +406,7 @@ fn kernels_under_half_a_pixel_change_nothing() {
         // A head 60 m away.
         let mut frame = hostile(9);
         frame.depth_mm.iter_mut().for_each(|d| *d = if d.is_finite() { 60_000.0 } else { *d });
-        let found = run(&gpu, method, &skin(), &frame);
+        let found = run(gpu, method, &skin(), &frame);
         for (f, e) in found.iter().zip(&frame.color) {
             assert_eq!([f[0], f[1], f[2]], *e, "{method}");
         }
@@ -423,7 +423,7 @@ fn no_light_crosses_a_gap() {
             let color = if finger { [4.0; 3] } else { [0.0; 3] };
             (color, 1.0, if finger { 392.0 } else { 400.0 })
         });
-        for (i, p) in run(&gpu, method, &skin(), &frame).iter().enumerate() {
+        for (i, p) in run(gpu, method, &skin(), &frame).iter().enumerate() {
             let expected = frame.color[i][0];
             assert!((0..3).all(|c| (p[c] - expected).abs() < 1e-6), "{method} at {}: {p:?}", i % 61);
         }
@@ -437,7 +437,7 @@ fn what_is_not_skin_takes_and_gives_nothing() {
         let frame = Frame::new([51, 27], 900.0, |x, _| {
             if x < 25 { ([0.25; 3], 1.0, 400.0) } else { ([9.0; 3], 0.0, 400.0) }
         });
-        for (i, p) in run(&gpu, method, &skin(), &frame).iter().enumerate() {
+        for (i, p) in run(gpu, method, &skin(), &frame).iter().enumerate() {
             let expected = if i % 51 < 25 { 0.25 } else { 9.0 };
             assert!((0..3).all(|c| (p[c] - expected).abs() < 3e-4), "{method} at {}: {p:?}", i % 51);
         }
@@ -457,7 +457,7 @@ fn any_zoom_gives_numbers() {
     for method in METHODS {
         for profile in [skin(), exponentials(1e-3), exponentials(100.0)] {
             let mut scatter = Scatter::default();
-            scatter.prepare(&gpu, method, &profile).unwrap();
+            scatter.prepare(gpu, method, &profile).unwrap();
             for (focal, depth) in [(1e-3, 1e6), (30.0, 2e4), (5e5, 11.0), (1e9, 10.5)] {
                 // The exact kernel is slow where it fills the picture; its window is bounded all the same.
                 if method == ScatterMethod::ReferenceScreen && focal > 1e3 {
@@ -466,7 +466,7 @@ fn any_zoom_gives_numbers() {
                 let mut frame = hostile(10);
                 frame.focal_px = f64::from(focal as f32);
                 frame.depth_mm.iter_mut().for_each(|d| *d *= depth / 400.0);
-                let found = run_with(&gpu, &frame, |r, images| {
+                let found = run_with(gpu, &frame, |r, images| {
                     scatter.record(r, images);
                 });
                 for p in found {
@@ -483,6 +483,6 @@ fn wrong_numbers_and_profiles_are_errors() {
     let mut scatter = Scatter::default();
     for method in [ScatterMethod::Separable(16), ScatterMethod::ScreenGauss(5), ScatterMethod::BurleyDisk(1)]
     {
-        assert!(matches!(scatter.prepare(&gpu, method, &skin()), Err(RenderError::Limit { .. })), "{method}");
+        assert!(matches!(scatter.prepare(gpu, method, &skin()), Err(RenderError::Limit { .. })), "{method}");
     }
 }
