@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         for _ in 0..frames {
             (image, stats) = studio.render(&shots, 0.0, &settings)?;
             let of_scatter = |(name, _): &&(&'static str, f64)| name.starts_with("scatter");
-            times.push(stats.passes_ms.iter().filter(of_scatter).map(|(_, ms)| ms).sum::<f64>());
+            times.push(stats.passes_ms.iter().filter(of_scatter).fold(0.0, |sum, (_, ms)| sum + ms));
         }
         times.sort_by(f64::total_cmp);
         let scatter_ms = if stats.passes_ms.is_empty() { None } else { times.get(times.len() / 2).copied() };

@@ -59,7 +59,7 @@ pub(crate) struct Images<'a> {
 
 enum Prepared {
     Separable(separable::Separable),
-    ScreenGauss(gauss::ScreenGauss),
+    ScreenGauss(Box<gauss::ScreenGauss>),
     Gather(gather::Gather),
 }
 
@@ -91,7 +91,7 @@ impl Scatter {
                 Some(Prepared::Separable(separable::Separable::new(gpu, profile, n as usize)?))
             }
             ScatterMethod::ScreenGauss(n) => {
-                Some(Prepared::ScreenGauss(gauss::ScreenGauss::new(gpu, profile, n as usize)?))
+                Some(Prepared::ScreenGauss(Box::new(gauss::ScreenGauss::new(gpu, profile, n as usize)?)))
             }
             ScatterMethod::ScreenJitter => Some(Prepared::Gather(jitter::gather(gpu, profile))),
             ScatterMethod::BurleyDisk(n) => Some(Prepared::Gather(disk::gather(gpu, profile, n as usize)?)),

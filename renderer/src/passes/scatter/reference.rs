@@ -90,8 +90,8 @@ impl Frame {
                         let j = if axis == 0 { self.index(x + step, y) } else { self.index(x, y + step) };
                         let offset = if axis == 0 { [pixel, 0.0] } else { [0.0, pixel] };
                         let k = share * self.arrives(&center, j, offset);
-                        for c in 0..3 {
-                            result[c] += weight[c] * k * (self.color[j][c] - center.color[c]);
+                        for (c, r) in result.iter_mut().enumerate() {
+                            *r += weight[c] * k * (self.color[j][c] - center.color[c]);
                         }
                     }
                 }
@@ -124,8 +124,8 @@ impl Frame {
                     let share = (1.0 - (offset[0] - there[0]).abs()) * (1.0 - (offset[1] - there[1]).abs());
                     let j = self.index(x + there[0] as i64, y + there[1] as i64);
                     let k = share * self.arrives(&center, j, there);
-                    for c in 0..3 {
-                        result[c] += f64::from(tap.weight[c]) * k * (self.color[j][c] - center.color[c]);
+                    for (c, r) in result.iter_mut().enumerate() {
+                        *r += f64::from(tap.weight[c]) * k * (self.color[j][c] - center.color[c]);
                     }
                 }
             }
@@ -150,8 +150,8 @@ impl Frame {
                     let weight = light(edge(0, -0.5), edge(1, -0.5), edge(0, 0.5), edge(1, 0.5));
                     let j = self.index(x + dx, y + dy);
                     let k = self.arrives(&center, j, offset);
-                    for c in 0..3 {
-                        result[c] += weight[c] * k * (self.color[j][c] - center.color[c]);
+                    for (c, r) in result.iter_mut().enumerate() {
+                        *r += weight[c] * k * (self.color[j][c] - center.color[c]);
                     }
                 }
             }
