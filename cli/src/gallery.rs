@@ -33,14 +33,14 @@ struct Row {
 }
 
 /// Three views of the whole head, a second each.
-const VIEWS: &str = r#"{ "fps": 1, "duration": 3, "camera": { "framing": "head", "elevationDegrees": 2,
+const VIEWS: &str = r#"{ "fps": 1, "duration": 3, "camera": { "framing": "head", "elevationDegrees": 2, "target": [0, -0.02, -0.06],
     "orbitDegrees": [{ "t": 0, "v": 0 }, { "t": 1, "v": 38 }, { "t": 2, "v": 90 }] } }"#;
 /// An eye, the mouth and an ear from near.
 const DETAILS: &str = r#"{ "fps": 1, "duration": 3, "camera": { "framing": "close", "fovDegrees": 9,
     "position": [{ "t": 0, "v": [0.0, 0.0, 0.45] }, { "t": 1, "v": [-0.1, -0.06, 0.48] }, { "t": 2, "v": [0.5, 0.0, 0.12] }],
     "target": [{ "t": 0, "v": [0.026, 0.004, 0.0] }, { "t": 1, "v": [0.0, -0.07, 0.0] }, { "t": 2, "v": [0.07, -0.015, -0.09] }] } }"#;
 /// The three-quarter view.
-const THREE_QUARTER: &str = r#"{ "fps": 1, "duration": 1, "camera": { "framing": "head", "orbitDegrees": 36, "elevationDegrees": 2 } }"#;
+const THREE_QUARTER: &str = r#"{ "fps": 1, "duration": 1, "camera": { "framing": "head", "target": [0, -0.02, -0.06], "orbitDegrees": 36, "elevationDegrees": 2 } }"#;
 const FLUSH: &str = r#"{ "fps": 1, "duration": 2, "camera": { "framing": "close", "orbitDegrees": -12 },
     "states": { "blush": [{ "t": 0, "v": 1 }, { "t": 1, "v": 0 }], "exercise": [{ "t": 0, "v": 0 }, { "t": 1, "v": 1 }] },
     "shapes": { "jawOpen": [{ "t": 0, "v": 0 }, { "t": 1, "v": 0.14 }] } }"#;

@@ -99,7 +99,7 @@ impl Hairs {
         let coarse = noise(squeezed(5.0), 0.9, self.seed ^ 14);
         let tufts = noise(place, 6.0, self.seed ^ 15);
         let strokes = smoothstep(-1.0, 0.9, fine + 0.5 * coarse + 0.2 * tufts + 3.4 * (density - 0.55));
-        (0.66 * density * density + 0.33 * strokes * smoothstep(0.0, 0.5, density)).min(0.97)
+        (0.78 * density * density + 0.21 * strokes * smoothstep(0.0, 0.5, density)).min(0.98)
     }
 
     /// Cut hairs as dots over a tint.

@@ -261,7 +261,7 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
 /// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and black-brown (0.5). Grey hair
 /// is a mix of hairs with pigment and of white ones.
 fn hair_color_linear(melanin: f32, grey: f32) -> [f32; 3] {
-    let white = [0.27, 0.265, 0.255];
+    let white = [0.26, 0.235, 0.205];
     let pigmented =
         [(0.80, 8.0), (0.72, 8.8), (0.60, 9.6)].map(|(root, k): (f32, f32)| root * (-k * melanin).exp());
     std::array::from_fn(|i| pigmented[i] + grey * (white[i] - pigmented[i]))

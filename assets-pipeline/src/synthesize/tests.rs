@@ -117,7 +117,7 @@ fn maps_are_valid_in_range_and_labelled() {
     for s in maps.specular.as_ref().unwrap().values.chunks(2) {
         assert!((0.0..=1.0).contains(&s[0]) && (0.15..=0.5).contains(&s[1]), "{s:?}");
     }
-    assert!(maps.zones.len() == 12 && maps.distributions.len() == 10);
+    assert!(maps.zones.len() == 12 && maps.distributions.len() == 9 && maps.hemoglobin_mean.is_some());
     for zone in &maps.zones {
         assert!(zone.mask.values.iter().all(|v| (0.0..=1.0).contains(v)));
         assert!(zone.mask.values.iter().any(|v| *v > 0.9), "zone {} has no core", zone.name);
@@ -265,10 +265,9 @@ fn regions_are_coloured_as_a_face_is() {
     assert!(cheek > 1.3 * forehead, "cheek {cheek}, forehead {forehead}");
     assert!(lips > 1.8 * cheek, "lips {lips}, cheek {cheek}");
     assert!(red(canonical("alare")) > 1.1 * forehead);
-    let melanin = maps.melanin.as_ref().unwrap();
-    let brow = mean_about(head, melanin, canonical("brow-middle"), 4.0);
-    let skin = mean_about(head, melanin, Vec3::new(0.0, 55.0, 85.0), 8.0);
-    assert!(brow > 2.5 * skin, "brow {brow}, skin {skin}");
+    let hair = |c: Vec3| mean_about(head, maps.hair.as_ref().unwrap(), c, 4.0);
+    let (brow, skin) = (hair(canonical("brow-middle")), hair(Vec3::new(0.0, 50.0, 86.0)));
+    assert!(brow > 0.3 && skin < 0.02, "brow {brow}, skin {skin}");
     let scattering = maps.scattering.as_ref().unwrap();
     assert!(mean_about(head, scattering, canonical("brow-middle"), 4.0) < 0.85);
     let specular = maps.specular.as_ref().unwrap();
@@ -281,11 +280,9 @@ fn states_move_blood_as_measured() {
     let head = made();
     let maps = &head.maps;
     let ratio = |state: &str, c: Vec3| {
-        let of = |name: &str| {
-            let d = maps.distributions.iter().find(|d| d.name == name).unwrap();
-            mean_about(head, &d.bias, c, 6.0)
-        };
-        of(state) / of("neutral")
+        let of = maps.distributions.iter().find(|d| d.name == state).unwrap();
+        let neutral = mean_about(head, maps.hemoglobin_mean.as_ref().unwrap(), c, 6.0);
+        mean_about(head, &of.bias, c, 6.0) / neutral
     };
     let (cheek_bone, cheek) = (Vec3::new(52.0, -20.0, 60.0), canonical("cheek"));
     let (forehead, nose) = (Vec3::new(0.0, 55.0, 85.0), canonical("pronasale"));
@@ -315,7 +312,7 @@ fn full_weight_of_a_state_reaches_its_mean() {
     let neutral = maps.hemoglobin.as_ref().unwrap();
     let blended = rubor_rig::hemoglobin::blend(
         neutral,
-        &maps.distributions[0].bias,
+        maps.hemoglobin_mean.as_ref().unwrap(),
         &maps.distributions,
         &weights,
         1.0,
