@@ -167,7 +167,6 @@ pub const CHARACTERS: [Character; 6] = [
         scalp_hair: 0.75,
         hair_melanin: 0.4,
         grey_hair: 0.75,
-        ..DEFAULT
     },
     Character {
         name: "anjali",
