@@ -92,7 +92,12 @@ pub struct MapEntries {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hair: Option<MapEntry>,
     /// Albedo of that hair, linear Rec. 709.
+    #[serde(skip_serializing_if = "is_black")]
     pub hair_color_linear: [f32; 3],
+}
+
+fn is_black(color: &[f32; 3]) -> bool {
+    *color == [0.0; 3]
 }
 
 /// A map in an image of the document.

@@ -70,6 +70,7 @@ fn head() -> Head {
     head.maps.hemoglobin = Some(Map::filled(4, 4, &[0.05]));
     head.maps.slopes = Some(wave(16, 9, 2, -0.8, 1.3));
     head.maps.wrinkle_slopes = vec![wave(8, 8, 2, -2.0, 2.0)];
+    head.maps.hemoglobin_mean = Some(wave(8, 8, 1, 0.0, 0.1));
     head.maps.distributions = vec![Distribution {
         name: "joy".into(),
         scale: wave(8, 8, 1, 0.0, 3.0),
