@@ -351,6 +351,7 @@ impl Shade {
             vec![
                 (0, lighting.view.as_entire_binding()),
                 (1, params.as_entire_binding()),
+                (2, texture(lighting.ids)),
                 (3, texture(lighting.shadows)),
                 (5, sampler(&self.trilinear_repeat)),
                 (6, sampler(&self.linear_clamp)),
