@@ -90,7 +90,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
         overlay::SHADER,
         "Params",
         size_of::<overlay::Params>(),
-        &offsets!(overlay::Params; ambient as "ambient", first as "first"),
+        &offsets!(overlay::Params; ambient as "ambient", first as "first", hair as "hair"),
     );
     assert_layout(
         display::SHADER,

@@ -15,10 +15,14 @@ const CELLS: [[f32; 2]; 7] =
 
 /// Moves the texture coordinates of skin faces into the unit square if they lie in several tiles: the tile with most
 /// faces gets nine sixteenths of the square, the others a sixteenth each. Tiles beyond the eighth stay where they are.
-/// A face that crosses a tile border counts where its first corner lies.
+/// A face counts where its middle lies, so that one that ends on the border of a tile is inside.
 pub(crate) fn pack(mesh: &mut PolyMesh, parts: &[(String, Material)]) {
     let is_skin = |f: usize| parts[mesh.face_groups[f] as usize].1 == Material::Skin;
-    let tile = |f: usize| mesh.uvs[mesh.face(f)[0].uv as usize].floor().as_ivec2();
+    let tile = |f: usize| {
+        let corners = mesh.face(f);
+        let sum: Vec2 = corners.iter().map(|c| mesh.uvs[c.uv as usize]).sum();
+        (sum / corners.len().max(1) as f32).floor().as_ivec2()
+    };
     let mut faces_of: BTreeMap<(i32, i32), Vec<usize>> = BTreeMap::new();
     for f in (0..mesh.face_count()).filter(|f| is_skin(*f)) {
         let t = tile(f);
