@@ -1,4 +1,4 @@
-//! Polygon meshes: what an importer works on before it becomes a [`Head`].
+//! Polygon meshes: what an importer works on before it becomes a `Head`.
 //!
 //! ```text
 //! OBJ, base mesh --> PolyMesh + Shape --subdivide, clip (as stencils)--> PolyMesh + Shape --build--> Head

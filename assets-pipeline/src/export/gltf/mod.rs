@@ -82,7 +82,7 @@ pub fn write(head: &Head, options: &Options, path: &Path) -> Result<(), ExportEr
 /// The bytes of the `.glb`.
 ///
 /// # Errors
-/// As [`write`], without the file.
+/// As [`write()`], without the file.
 pub fn to_bytes(head: &Head, options: &Options) -> Result<Vec<u8>, ExportError> {
     head.validate()?;
     if head.mesh.triangles.is_empty() {
