@@ -26,6 +26,8 @@ lint:
 
 unit:
 	$(CARGO) test --workspace --locked
+	@if command -v python3 >/dev/null; then python3 -m unittest discover -q -s maya-bridge/python/tests; \
+	else echo "SKIPPED: the tests of the Maya module need python3"; fi
 
 docs:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked
