@@ -30,6 +30,7 @@ mod schema;
 mod sequence_job;
 mod studio;
 mod video;
+mod walks;
 
 /// Faces whose skin changes colour and wrinkles as they act.
 ///

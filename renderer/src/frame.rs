@@ -6,6 +6,7 @@ use glam::{Mat4, Vec3};
 use rubor_rig::skin::profile::Profile;
 use serde::Serialize;
 
+use crate::clusters::{self, Sphere, Viewer};
 use crate::error::RenderError;
 use crate::gpu::{Gpu, PassTimer};
 use crate::head::{GpuVertex, HeadOnGpu};
@@ -288,7 +289,8 @@ impl Renderer {
         settings: &Settings,
     ) -> Result<(Image, FrameStats), RenderError> {
         self.check(scene, settings)?;
-        let shadow_layers = scene.lights.iter().filter(|l| l.casts_shadow).count() as u32;
+        let lamps = lamps(scene, settings);
+        let shadow_layers = lamps.iter().filter(|l| l.casts_shadow).count() as u32;
         if !self.targets.as_ref().is_some_and(|t| t.matches(settings, shadow_layers)) {
             self.targets = Some(Targets::new(&self.gpu, settings, shadow_layers));
             self.antialias = None;
@@ -313,7 +315,7 @@ impl Renderer {
         }
         self.is_scattered = settings.scatter != ScatterMethod::None;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let scatter_noise = self.record_frame(&mut encoder, scene, settings)?;
+        let scatter_noise = self.record_frame(&mut encoder, scene, &lamps, settings)?;
         self.gpu.queue.submit([encoder.finish()]);
         let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
         let image =
@@ -465,6 +467,7 @@ impl Renderer {
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         scene: &Scene<'_>,
+        lamps: &[Light],
         settings: &Settings,
     ) -> Result<Option<f64>, RenderError> {
         let (gpu, timer) = (&self.gpu, &mut self.timer);
@@ -492,7 +495,7 @@ impl Renderer {
             }
         }
 
-        let (lights, layers) = place_lights(scene, &targets.shadows);
+        let (lights, layers) = place_lights(scene, lamps, &targets.shadows, &receivers(scene, settings));
         for (light, layer) in &layers {
             self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
         }
@@ -507,7 +510,8 @@ impl Renderer {
             let first = &targets.samples[0];
             // A camera reaches a place in the pixel by moving the image the other way.
             let jitter = subsample.position_px.map(|p| -p);
-            let view = view(scene, targets.size, [jitter, shading_jitter], self.past.clip_from_world);
+            let jitters = [jitter, shading_jitter];
+            let view = view(scene, lamps, targets.size, jitters, self.past.clip_from_world);
             let view = gpu.uniform("view", &view);
             self.visibility.record(gpu, encoder, timer, &view, &drawn, &sample.ids, &sample.depth);
 
@@ -622,6 +626,7 @@ impl Renderer {
 
 fn view(
     scene: &Scene<'_>,
+    lamps: &[Light],
     size: [u32; 2],
     [jitter, shading_jitter]: [[f32; 2]; 2],
     previous: Option<Mat4>,
@@ -645,7 +650,7 @@ fn view(
         has_environment: u32::from(scene.environment.is_some()),
         jitter,
         near: NEAR_METRES,
-        light_count: scene.lights.len() as u32,
+        light_count: lamps.len() as u32,
         shading_jitter,
         padding: [0.0; 2],
     }
@@ -653,6 +658,9 @@ fn view(
 
 /// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
 const PICTURE_MARGIN: f32 = 1.25;
+
+/// Cosine between the camera's view and the way to a lamp from which the lamp stands behind the heads.
+const BEHIND_COSINE: f32 = 0.4;
 
 /// Adds all heads to the integral of `reference-surface`.
 fn integrate(
@@ -707,17 +715,59 @@ fn world_from_head(instance: &crate::scene::HeadInstance<'_>) -> Mat4 {
         * Mat4::from_rotation_translation(instance.state.head_rotation, instance.state.head_translation)
 }
 
+/// The lamps of a scene and, where the environment's light is to pass through thin parts and no lamp with shadows
+/// shines from behind the heads, a dark one there whose shadow map tells how thick they are.
+fn lamps(scene: &Scene<'_>, settings: &Settings) -> Vec<Light> {
+    let mut lamps = scene.lights.to_vec();
+    let (center, _) = bounding_sphere(scene);
+    let view = (center - scene.camera.position).normalize_or(Vec3::NEG_Z);
+    let is_behind = |l: &Light| {
+        let direction = match l.kind {
+            LightKind::Directional { direction } => direction,
+            LightKind::Spot { position, .. } | LightKind::Point { position } => center - position,
+        };
+        l.casts_shadow && direction.normalize_or_zero().dot(view) < -BEHIND_COSINE
+    };
+    let transmits = settings.transmit == TransmitMethod::ShadowDepth
+        && !matches!(settings.scatter, ScatterMethod::ReferenceSurface(_));
+    if transmits && scene.environment.is_some() && lamps.len() < MAX_LIGHTS && !lamps.iter().any(is_behind) {
+        let kind = LightKind::Directional { direction: -view };
+        lamps.push(Light { kind, color_linear: Vec3::ZERO, radius: 0.0, casts_shadow: true });
+    }
+    lamps
+}
+
+/// Where the heads are lit for a picture: what the camera sees of them, and for the integral over the surface also what
+/// is turned away.
+fn receivers(scene: &Scene<'_>, settings: &Settings) -> Vec<Sphere> {
+    let [width, height] = settings.size;
+    let clip_from_view = scene.camera.clip_from_view(width as f32 / height as f32);
+    let is_surface = matches!(settings.scatter, ScatterMethod::ReferenceSurface(_));
+    let viewer = Viewer {
+        position: scene.camera.position,
+        clip_from_world: clip_from_view * scene.camera.view_from_world(),
+        margin: if is_surface { PICTURE_MARGIN } else { 1.0 },
+        sees_backs: is_surface,
+    };
+    let of_head = |h: &crate::scene::HeadInstance<'_>| {
+        clusters::visible(&h.head.clusters, &h.state.shapes, world_from_head(h), &viewer)
+    };
+    scene.heads.iter().flat_map(of_head).collect()
+}
+
 /// Lights for the shader, and (view, layer) of those that cast shadows.
 fn place_lights(
     scene: &Scene<'_>,
+    lamps: &[Light],
     shadows: &wgpu::Texture,
+    receivers: &[Sphere],
 ) -> ([GpuLight; MAX_LIGHTS], Vec<(LightView, wgpu::TextureView)>) {
     let (center, radius) = bounding_sphere(scene);
     let mut gpu_lights: [GpuLight; MAX_LIGHTS] = bytemuck::Zeroable::zeroed();
     let mut layers = Vec::new();
-    for (slot, light) in gpu_lights.iter_mut().zip(scene.lights) {
+    for (slot, light) in gpu_lights.iter_mut().zip(lamps) {
         let shadow = light.casts_shadow.then(|| {
-            let view = LightView::fit(&light.kind, center, radius);
+            let view = LightView::fit(&light.kind, center, radius).narrowed(&light.kind, receivers);
             let layer = layers.len() as u32;
             let target = shadows.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2),

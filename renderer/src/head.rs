@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::map::Map;
 
+use crate::clusters::{Cluster, clusters};
 use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::texture::{self, Texel};
@@ -60,6 +61,8 @@ pub struct HeadOnGpu {
     pub(crate) maps: Option<MapsOnGpu>,
     pub(crate) skin_color: wgpu::TextureView,
     pub(crate) bounds: (Vec3, Vec3),
+    /// Where its opaque parts can be.
+    pub(crate) clusters: Vec<Cluster>,
     /// Bytes of buffers and textures on the device.
     pub memory_bytes: u64,
 }
@@ -134,6 +137,7 @@ impl HeadOnGpu {
             maps,
             skin_color,
             bounds,
+            clusters: clusters(head),
             memory_bytes: 0,
         };
         result.memory_bytes = result.count_bytes();

@@ -17,6 +17,7 @@
 //! # Ok::<(), rubor_renderer::RenderError>(())
 //! ```
 
+mod clusters;
 mod environment;
 mod error;
 mod frame;
@@ -39,5 +40,6 @@ pub use head::{
 };
 pub use passes::antialias;
 pub use passes::scatter::ScatterMethod;
+pub use passes::scatter::surface::BARE_SKIN;
 pub use passes::shade::TransmitMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
