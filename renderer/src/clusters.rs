@@ -159,7 +159,7 @@ mod tests {
     use glam::camera::rh::{proj, view};
     use rubor_rig::head::{BlendShape, Material, Mesh, Part, Vertex};
 
-    /// A ball of 8 cm radius; shape 0 moves its top by 2 cm.
+    /// A ball of 8 cm radius; shape 0 pulls its top up by 2 cm.
     fn ball() -> Head {
         const N: u32 = 48;
         let mut mesh = Mesh::default();
@@ -183,7 +183,7 @@ mod tests {
         mesh.parts.push(Part { name: "ball".into(), material: Material::Skin, triangles });
         let top: Vec<u32> =
             (0..mesh.points.len() as u32).filter(|p| mesh.points[*p as usize].y > 0.06).collect();
-        let offsets = vec![0.02 * Vec3::Y; top.len()];
+        let offsets = top.iter().map(|p| (mesh.points[*p as usize].y - 0.06) * Vec3::Y).collect();
         let shapes = vec![BlendShape { name: "top".into(), points: top, offsets }];
         Head { mesh, shapes, ..Head::default() }
     }
@@ -205,12 +205,12 @@ mod tests {
         let clusters = clusters(&head);
         for (fov, target) in [(40.0, Vec3::ZERO), (4.0, Vec3::ZERO), (4.0, Vec3::new(0.05, 0.05, 0.0))] {
             let viewer = viewer(fov, target);
-            for weight in [0.0, 1.0, -1.0] {
+            for weight in [0.0, 1.0, -0.5] {
                 let spheres = visible(&clusters, &[weight], Mat4::IDENTITY, &viewer);
                 assert!(spheres.len() < clusters.len(), "{} of {}", spheres.len(), clusters.len());
                 let mut points = head.mesh.points.clone();
-                for p in &head.shapes[0].points {
-                    points[*p as usize].y += 0.02 * weight;
+                for (p, offset) in head.shapes[0].points.iter().zip(&head.shapes[0].offsets) {
+                    points[*p as usize] += weight * *offset;
                 }
                 let normals = rubor_rig::deform::point_normals(&head.mesh, &points);
                 for (p, n) in points.iter().zip(normals) {

@@ -440,9 +440,7 @@ fn shadow(light: Light, surface: Surface, lit: Arriving, turn: f32) -> f32 {
     if light.position.w > 0.0 {
         penumbra *= receiver / blocker;
     }
-    // An edge narrower than a pixel is an alias.
-    let pixel = distance(view.origin.xyz, surface.position) / view.origin.w;
-    let width = clamp(penumbra, max(1.2 * texel, 0.6 * pixel), WIDEST_METRES);
+    let width = clamp(penumbra, 1.2 * texel, WIDEST_METRES);
     var light_seen = 0.0;
     for (var i = 0u; i < FILTER_SAMPLES; i++) {
         let offset = width * vogel_disk(i, FILTER_SAMPLES, turn);
@@ -485,8 +483,11 @@ fn unseen(surface: Surface, way_mm: vec3f) -> f32 {
         return 1.0;
     }
     let pixel = vec2i((ndc * vec2f(0.5, -0.5) + 0.5) * vec2f(view.size));
-    let before_mm = 1e3 * (clip.w - view_depth(view, textureLoad(depth, pixel, 0)));
-    return max(off_plane, smoothstep(0.5, 1.5, before_mm));
+    // How deep the point is under what the pixel shows, across the surface: where in the pixel it lies does not matter.
+    let ray = pixel_ray(view, vec2f(pixel) + 0.5, view.jitter);
+    let shown = view.origin.xyz + view_depth(view, textureLoad(depth, pixel, 0)) * ray;
+    let under_mm = 1e3 * dot(shown - surface.position, surface.facet) - dot(way_mm, surface.facet);
+    return max(off_plane, smoothstep(0.2, 0.6, under_mm));
 }
 
 // Light that arrives from what a light shines on and the camera does not see (papers/004 eq. 5.8), as diffuse radiance
