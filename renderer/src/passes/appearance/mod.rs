@@ -14,8 +14,9 @@
 //!
 //! Does not: clamp hemoglobin to its physical range (that needs `H_n`: see `shade`).
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::{APPEARANCE_SIZE, MAX_DISTRIBUTIONS, MAX_ZONES, MapsOnGpu};
+use crate::pass_timer::PassTimer;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = include_str!("appearance.wgsl");

@@ -9,7 +9,8 @@
 
 use glam::Vec3;
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = include_str!("compose.wgsl");

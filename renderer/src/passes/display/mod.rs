@@ -7,7 +7,8 @@
 //! Theory: exposure, the filmic curve of Hable 2010 (papers/004 section 8.3 and ch. 11: "really crisp blacks"),
 //! IEC 61966-2-1 transfer. With more than one sample a pixel (`ssaa`), each sample is tone mapped before the mean.
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = include_str!("display.wgsl");

@@ -11,8 +11,9 @@
 use glam::camera::rh::{proj, view};
 use glam::{Mat4, Vec3};
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
+use crate::pass_timer::PassTimer;
 use crate::scene::LightKind;
 
 /// WGSL of the pass.

@@ -9,8 +9,9 @@
 //!
 //! Does not: follow what moves on the surface (blood, wrinkles), or the blended overlays.
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
+use crate::pass_timer::PassTimer;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(

@@ -8,8 +8,9 @@
 //! its fragment shader stores one integer, everything else is compute (see ARCHITECTURE.md for what that saves).
 //! Reversed infinite depth keeps 24 bits at any distance (Lapidous and Jiao 1999).
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
+use crate::pass_timer::PassTimer;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(
