@@ -74,6 +74,10 @@ pub fn list_adapters() -> Vec<AdapterDescription> {
     adapters().iter().enumerate().map(|(i, a)| describe(i, a)).collect()
 }
 
+/// Features that are used where the adapter has them; nothing needs them.
+const WELCOME_FEATURES: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::PRIMITIVE_INDEX);
+
 impl Gpu {
     /// Opens the best adapter, or the one whose index or part of whose name (any letter case) is `wanted`.
     ///
@@ -113,11 +117,7 @@ impl Gpu {
         };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("rubor"),
-            required_features: if has_timestamps {
-                wgpu::Features::TIMESTAMP_QUERY
-            } else {
-                wgpu::Features::empty()
-            },
+            required_features: adapter.features() & WELCOME_FEATURES,
             required_limits,
             ..Default::default()
         };

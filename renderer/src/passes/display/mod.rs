@@ -9,9 +9,11 @@
 
 use crate::gpu::Gpu;
 use crate::pass_timer::PassTimer;
+use crate::passes::BLOCK_GROUP;
 
 /// WGSL of the pass.
-pub(crate) const SHADER: &str = include_str!("display.wgsl");
+pub(crate) const SHADER: &str =
+    concat!(include_str!("../../shared/blocks.wgsl"), include_str!("display.wgsl"));
 
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -57,6 +59,6 @@ impl Display {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         let size = image.texture().size();
-        pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+        pass.dispatch_workgroups(size.width.div_ceil(BLOCK_GROUP), size.height.div_ceil(BLOCK_GROUP), 1);
     }
 }
