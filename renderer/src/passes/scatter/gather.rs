@@ -2,6 +2,7 @@
 
 use super::{FOLLOW_PER_MM, Images, Recorder};
 use crate::gpu::Gpu;
+use crate::passes::BLOCK_GROUP;
 
 /// A tap as gather.wgsl reads it.
 #[repr(C)]
@@ -30,8 +31,13 @@ pub(crate) struct Gather {
 
 /// WGSL of the pass of a method.
 pub(crate) fn shader(method: &str) -> String {
-    [include_str!("../../shared/view.wgsl"), include_str!("common.wgsl"), include_str!("gather.wgsl"), method]
-        .concat()
+    let shared = concat!(
+        include_str!("../../shared/view.wgsl"),
+        include_str!("../../shared/blocks.wgsl"),
+        include_str!("common.wgsl"),
+        include_str!("gather.wgsl")
+    );
+    [shared, method].concat()
 }
 
 impl Gather {
@@ -64,6 +70,7 @@ impl Gather {
             self.params.as_entire_binding(),
             self.taps.as_entire_binding(),
             texture(images.irradiance),
+            texture(images.albedo),
             texture(images.depth),
             texture(images.scattered),
         ];
@@ -72,6 +79,6 @@ impl Gather {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         let size = images.scattered.texture().size();
-        pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+        pass.dispatch_workgroups(size.width.div_ceil(BLOCK_GROUP), size.height.div_ceil(BLOCK_GROUP), 1);
     }
 }
