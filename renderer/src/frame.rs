@@ -615,12 +615,12 @@ fn view(
     }
 }
 
-/// View depth of the middle of the head that is nearest to the camera, metres.
+/// View depth of the nearest head, between its middle and its front, metres: depths near it are kept best.
 fn nearest_head(scene: &Scene<'_>, view_from_world: &Mat4) -> f32 {
     let depth = |instance: &crate::scene::HeadInstance<'_>| {
         let (low, high) = instance.head.bounds;
         let middle = world_from_head(instance).transform_point3(0.5 * (low + high));
-        -view_from_world.transform_point3(middle).z
+        -view_from_world.transform_point3(middle).z - 0.25 * (high - low).min_element()
     };
     scene.heads.iter().map(depth).filter(|d| *d > 0.0).reduce(f32::min).unwrap_or(0.0)
 }

@@ -2,7 +2,6 @@
 
 use super::{FOLLOW_PER_MM, Images, Recorder};
 use crate::gpu::Gpu;
-use crate::passes::BLOCK_GROUP;
 
 /// A tap as gather.wgsl reads it.
 #[repr(C)]
@@ -33,7 +32,6 @@ pub(crate) struct Gather {
 pub(crate) fn shader(method: &str) -> String {
     let shared = concat!(
         include_str!("../../shared/view.wgsl"),
-        include_str!("../../shared/blocks.wgsl"),
         include_str!("common.wgsl"),
         include_str!("gather.wgsl")
     );
@@ -79,6 +77,6 @@ impl Gather {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         let size = images.scattered.texture().size();
-        pass.dispatch_workgroups(size.width.div_ceil(BLOCK_GROUP), size.height.div_ceil(BLOCK_GROUP), 1);
+        pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
     }
 }

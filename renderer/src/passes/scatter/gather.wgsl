@@ -1,4 +1,4 @@
-// A pass that gathers neighbours in two dimensions. Concatenated after view.wgsl, blocks.wgsl and common.wgsl; the method that
+// A pass that gathers neighbours in two dimensions. Concatenated after view.wgsl and common.wgsl; the method that
 // follows has fn blur(at: vec2i, center: Center) -> vec3f.
 
 struct Params {
@@ -53,16 +53,11 @@ fn depth_at(at: vec2i) -> f32 {
 }
 
 @compute @workgroup_size(8, 8)
-fn scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
-    for (var i = 0u; i < BLOCKS; i++) {
-        let at = block_pixel(group, local, i);
-        if all(at < view.size) {
-            scatter_pixel(vec2i(at));
-        }
+fn scatter(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= view.size) {
+        return;
     }
-}
-
-fn scatter_pixel(at: vec2i) {
+    let at = vec2i(id.xy);
     let raw = textureLoad(irradiance, at, 0);
     if raw.a >= NO_SKIN_MM {
         textureStore(scattered, at, raw);

@@ -8,6 +8,8 @@ use super::gather::Tap;
 pub(crate) const DEPTH_ORIGIN_MM: f64 = 400.0;
 /// A sample this near to the tangent plane is of one surface.
 const PLANE_MM: f64 = 0.1;
+/// So is one that is as near as a surface with a radius of 25 mm.
+const CURVATURE_PER_MM: f64 = 0.02;
 /// Relative depth of what is not skin.
 const FAR_MM: f64 = 8192.0;
 
@@ -108,7 +110,8 @@ impl Frame {
                     let between = |p: f64, q: f64| p + (along - low) * (q - p);
                     let depth = between(self.relative_mm(a), self.relative_mm(b));
                     let plane = center.relative_mm + center.slope[axis] * along;
-                    let is_on_plane = (depth - plane).abs() <= PLANE_MM;
+                    let is_on_plane =
+                        (depth - plane).abs() <= PLANE_MM.max(CURVATURE_PER_MM * offset_mm * offset_mm);
                     let place = |pixel: f64| if axis == 0 { [pixel, 0.0] } else { [0.0, pixel] };
                     let texel = |i: usize, pixel: f64, c: usize| {
                         Self::arrives(&center, self.relative_mm(i), place(pixel))

@@ -25,8 +25,9 @@ struct Params {
 //ACCUMULATE @group(0) @binding(7) var sum_before: texture_2d<f32>;
 //ACCUMULATE @group(0) @binding(8) var sum_after: texture_storage_2d<rgba16float, write>;
 
-// A sample this near to the tangent plane is of one surface.
+// A sample as near to the tangent plane as this, or as a surface with a radius of 25 mm would be, is of one surface.
 const PLANE_MM = 0.1;
+const CURVATURE_PER_MM = 0.02;
 // One that is farther than this has nothing of skin.
 const ALL_FAR_MM = 0.99 * FAR_MM;
 
@@ -76,12 +77,12 @@ fn texel(at: vec2i) -> vec4f {
 
 // A tap x pixels along the line. On the tangent plane one bilinear sample of light and depth is enough; off it, the two
 // texels may be of two surfaces, and each goes by its own depth.
-fn tap(at: vec2i, x: f32, center: vec4f, slope: f32) -> vec3f {
+fn tap(at: vec2i, x: f32, center: vec4f, slope: f32, plane_mm: f32) -> vec3f {
     let axis = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
     let place = (vec2f(at) + 0.5 + x * vec2f(axis)) / vec2f(view.size);
     let light = textureSampleLevel(source, linear, place, 0.0);
     let expected_mm = center.a + slope * x;
-    if abs(light.a - expected_mm) <= PLANE_MM || light.a > ALL_FAR_MM {
+    if abs(light.a - expected_mm) <= plane_mm || light.a > ALL_FAR_MM {
         return change(light, center, expected_mm);
     }
     let low = floor(x);
@@ -109,7 +110,8 @@ fn blur(at: vec2i) -> vec4f {
     for (var i = 0u; i < params.pair_count; i++) {
         let pair = params.pairs[i];
         let x = min(pair.w * scale, MAX_REACH);
-        result += pair.rgb * (tap(at, x, center, slope) + tap(at, -x, center, slope));
+        let plane_mm = max(PLANE_MM, CURVATURE_PER_MM * pair.w * pair.w);
+        result += pair.rgb * (tap(at, x, center, slope, plane_mm) + tap(at, -x, center, slope, plane_mm));
     }
     return vec4f(result, center.a);
 }
