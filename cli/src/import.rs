@@ -9,7 +9,6 @@ use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 
 use crate::failure::{Failure, Outcome};
-use crate::sequence_job::neutral_color;
 
 #[derive(clap::Args)]
 #[group(skip)]
@@ -208,9 +207,8 @@ pub(crate) fn finish_with(
         options.melanin = common.melanin.unwrap_or(options.melanin);
         synthesize::synthesize_into(&mut head, &options).map_err(Failure::input)?;
     }
-    let rig = serde_json::to_value(rig).map_err(Failure::job)?;
     let options = export::gltf::Options {
-        base_color: neutral_color(&head, if common.small { 1024 } else { 2048 }),
+        color_map_size: if common.small { 1024 } else { 2048 },
         rig: Some(rig),
         morph_normals: !common.small,
         maps: if common.small { MapEncodings::small() } else { MapEncodings::default() },

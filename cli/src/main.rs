@@ -14,6 +14,7 @@ mod chart;
 mod compare;
 mod contact_sheet;
 mod demo;
+mod export;
 mod failure;
 mod filter;
 mod gallery;
@@ -51,6 +52,8 @@ enum Command {
     Gallery(gallery::Arguments),
     /// Make a head from other files
     Import(import::Arguments),
+    /// Write an animated head for other programs: .glb
+    Export(export::Arguments),
     /// Make the maps of a head: hemoglobin, chromophores, normals, transfer
     Maps(maps::MapsArgs),
     /// Maya ASCII scenes in and out
@@ -77,6 +80,7 @@ fn main() -> ExitCode {
         Command::Render(a) => render::run(&a),
         Command::Gallery(a) => gallery::run(&a),
         Command::Import(a) => import::run(&a),
+        Command::Export(a) => export::run(&a),
         Command::Maya(a) => maya::run(&a),
         Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
         Command::Filter(a) => filter::run(&a),

@@ -9,7 +9,6 @@ use rubor_rig::expression::Rig;
 
 use crate::failure::{Failure, Outcome};
 use crate::import::{Common, finish_with};
-use crate::sequence_job::neutral_color;
 use crate::{inputs, output};
 
 #[derive(clap::Args)]
@@ -116,7 +115,7 @@ fn export(arguments: &Export) -> Outcome {
         None => None,
     };
     let options = write::Options {
-        base_color: neutral_color(&loaded.head, 2048),
+        base_color: rubor_assets::export::skin_color::bake(&loaded.head, None, 2048, 1.0),
         // Only those of which the head has both ends.
         inbetweens: (rig.inbetweens.iter())
             .filter(|i| [&i.shape, &i.target].iter().all(|n| loaded.head.shape_index(n).is_some()))

@@ -18,23 +18,15 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
-use rubor_rig::expression::{Inbetween, Rig};
+use rubor_rig::expression::Inbetween;
 use rubor_rig::head::Head;
-use rubor_rig::timeline::Sequence;
 
 use crate::appearance::Appearance;
 use crate::ascii::lexer::quoted;
 use crate::error::WriteError;
 use crate::plain_name;
 
-/// A performance to write with the head.
-#[derive(Clone, Copy, Debug)]
-pub struct Performance<'a> {
-    /// Expressions and states of the sequence are looked up here.
-    pub rig: &'a Rig,
-    /// What happens.
-    pub sequence: &'a Sequence,
-}
+pub use rubor_assets::export::Performance;
 
 /// What to write beside the geometry.
 #[derive(Clone, Debug, Default)]

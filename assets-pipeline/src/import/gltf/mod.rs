@@ -29,6 +29,8 @@ pub struct ImportedHead {
     pub head: Head,
     /// The rig file that the head carries.
     pub rig: Option<serde_json::Value>,
+    /// The sequence file that its animation was made from.
+    pub sequence: Option<serde_json::Value>,
 }
 
 /// Reads a `.glb` or `.gltf`. Buffers and images may be in the file, in data URIs, or in files of the same folder or
@@ -49,7 +51,7 @@ pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError
     let document = Document::load(bytes, path)?;
     let imported = match document.gltf.extension_value(NAME) {
         Some(extension) => own::read(&document, extension)?,
-        None => ImportedHead { head: foreign::read(&document)?, rig: None },
+        None => ImportedHead { head: foreign::read(&document)?, ..ImportedHead::default() },
     };
     imported.head.validate()?;
     Ok(imported)
