@@ -11,6 +11,7 @@ use clap::{Parser, Subcommand};
 mod adapters;
 mod capture;
 mod chart;
+mod check;
 mod compare;
 mod contact_sheet;
 mod demo;
@@ -54,6 +55,8 @@ enum Command {
     Import(import::Arguments),
     /// Write an animated head for other programs: .glb
     Export(export::Arguments),
+    /// Tell what is wrong with files, what has no effect, and why a wrinkle does not show
+    Check(check::Arguments),
     /// Make the maps of a head: hemoglobin, chromophores, normals, transfer
     Maps(maps::MapsArgs),
     /// Maya ASCII scenes in and out
@@ -81,6 +84,7 @@ fn main() -> ExitCode {
         Command::Gallery(a) => gallery::run(&a),
         Command::Import(a) => import::run(&a),
         Command::Export(a) => export::run(&a),
+        Command::Check(a) => check::run(&a),
         Command::Maya(a) => maya::run(&a),
         Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
         Command::Filter(a) => filter::run(&a),

@@ -450,7 +450,7 @@ mod tests {
     fn a_larger_tolerance_leaves_out_keys() {
         let noisy: Vec<(f64, f32, Ease)> = (0..=120)
             .map(|i| {
-                (f64::from(i) / 60.0, (i as f32 * 0.05).sin() + 1e-4 * (i as f32 * 7.3).sin(), Ease::Linear)
+                (f64::from(i) / 60.0, (i as f32 * 0.02).sin() + 1e-4 * (i as f32 * 7.3).sin(), Ease::Linear)
             })
             .collect();
         let noisy = [track(&noisy)];

@@ -11,6 +11,7 @@
 mod accessor;
 mod document;
 mod foreign;
+mod lint;
 mod own;
 
 use std::fs;
@@ -19,6 +20,7 @@ use std::path::Path;
 use rubor_rig::head::Head;
 
 use self::document::Document;
+pub use self::lint::lint;
 use crate::error::ImportError;
 use crate::facial_appearance::NAME;
 
