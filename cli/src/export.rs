@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rubor_assets::error::ExportError;
 use rubor_assets::export::gltf::{self, MapEncodings};
-use rubor_assets::export::{Performance, TextureFormat, top_shapes};
+use rubor_assets::export::{Performance, TextureFormat, top_shapes, usd};
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::expression::Rig;
 use rubor_rig::face_state::FaceState;
@@ -27,7 +27,7 @@ pub(crate) struct Arguments {
     /// A sequence (.json) to animate [default: the one in the head, if it has one]
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
-    /// The file to write (.glb)
+    /// The file to write (.glb, or .usda with its pictures beside it)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Write no animation
@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
     /// How far weights may be from the performance where keys are left out; 0 keeps every authored key
     #[arg(long, default_value_t = 1e-5, value_name = "WEIGHT", value_parser = parse_tolerance)]
     tolerance: f32,
-    /// Pictures for other programs: png, jpeg or webp
+    /// Pictures for other programs: png, jpeg, or webp (.glb only)
     #[arg(long, default_value = "jpeg", value_name = "FORMAT", value_parser = parse_textures)]
     textures: TextureFormat,
     /// Only the N shapes that move most, for viewers that keep few
@@ -86,8 +86,12 @@ fn parse_textures(text: &str) -> Result<TextureFormat, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let path = &arguments.output;
-    if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("glb")) {
-        return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
+    let is = |extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    if !is("glb") && !is("usda") {
+        return Err(Failure::input(format!(
+            "{}: expected a name that ends in .glb or .usda",
+            path.display()
+        )));
     }
     let loaded = inputs::head(arguments.head.as_deref())?;
     let rig = inputs::rig(arguments.rig.as_deref(), loaded.rig)?;
@@ -112,6 +116,22 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             .map(|(_, s)| s.name.as_str())
             .collect();
         notes.push(format!("{} shapes are left out: {}", left.len(), left.join(", ")));
+    }
+    if is("usda") {
+        let options = usd::Options {
+            color_map_size: if arguments.small { 1024 } else { 2048 },
+            pose,
+            textures: arguments.textures,
+            shape_normals: !arguments.small,
+            shapes,
+            rig: Some(&rig),
+            sequence: sequence.as_ref(),
+            tolerance: arguments.tolerance,
+            ..usd::Options::default()
+        };
+        let layer = usd::write(head, &options, path)?;
+        notes.extend(layer.notes);
+        return report(arguments, path, head, kept, layer.keys, layer.text.len(), &notes);
     }
     let options = gltf::Options {
         color_map_size: if arguments.small { 1024 } else { 2048 },

@@ -19,6 +19,8 @@ pub(crate) struct LoadedHead {
     pub(crate) rig: Option<Rig>,
     /// The sequence that its animation was made from.
     pub(crate) sequence: Option<Sequence>,
+    /// What its animation holds.
+    pub(crate) animation: Option<Sequence>,
     /// Changes with any byte of the file.
     pub(crate) fingerprint: u64,
 }
@@ -49,7 +51,13 @@ pub(crate) fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
             Some(Sequence::from_json(&at, &value.to_string())?)
         }
     };
-    Ok(LoadedHead { head: imported.head, rig, sequence, fingerprint: fingerprint(&bytes) })
+    Ok(LoadedHead {
+        head: imported.head,
+        rig,
+        sequence,
+        animation: imported.animation,
+        fingerprint: fingerprint(&bytes),
+    })
 }
 
 /// FNV-1a: the same on every machine and in every version.

@@ -53,7 +53,7 @@ enum Command {
     Gallery(gallery::Arguments),
     /// Make a head from other files
     Import(import::Arguments),
-    /// Write an animated head for other programs: .glb
+    /// Write an animated head for other programs: .glb, .usda
     Export(export::Arguments),
     /// Tell what is wrong with files, what has no effect, and why a wrinkle does not show
     Check(check::Arguments),

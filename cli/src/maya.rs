@@ -101,8 +101,17 @@ fn import(arguments: &Import) -> Outcome {
         output::write(path, &serde_json::to_vec_pretty(sequence).map_err(Failure::job)?)?;
         println!("{}: {} frames at {} a second", path.display(), sequence.frame_count(), sequence.fps);
     }
-    let mut rig = Rig::default_rig()?;
-    rig.inbetweens.extend(imported.inbetweens);
+    let mut rig = match &imported.rig {
+        Some(value) => Rig::from_json(&format!("{} (rig)", arguments.scene.display()), &value.to_string())?,
+        None => Rig::default_rig()?,
+    };
+    for inbetween in imported.inbetweens {
+        let same =
+            |i: &rubor_rig::expression::Inbetween| i.shape == inbetween.shape && i.target == inbetween.target;
+        if !rig.inbetweens.iter().any(same) {
+            rig.inbetweens.push(inbetween);
+        }
+    }
     finish_with(imported.head, &rig, rubor_assets::synthesize::Options::default(), &arguments.common)
 }
 
@@ -121,6 +130,7 @@ fn export(arguments: &Export) -> Outcome {
             .filter(|i| [&i.shape, &i.target].iter().all(|n| loaded.head.shape_index(n).is_some()))
             .cloned()
             .collect(),
+        rig: Some(rig.clone()),
     };
     let performance = sequence.as_ref().map(|sequence| Performance { rig: &rig, sequence });
     for note in write::write(&loaded.head, performance, &options, &arguments.output)? {

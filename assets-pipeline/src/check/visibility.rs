@@ -111,10 +111,8 @@ fn zone_reason(head: &Head, index: usize, places: &[Vec2]) -> Option<Reason> {
         return Some(Reason::Wrong(why, "import the head with its wrinkle maps".into()));
     };
     if most(zone.mask.values.iter().copied()) < LEAST_WEIGHT {
-        return Some((
-            "its mask is black: it covers nothing".into(),
-            "paint the mask where the zone is".into(),
-        ));
+        let why = "its mask is black: it covers nothing";
+        return Some(Reason::Wrong(why.into(), "paint the mask where the zone is".into()));
     }
     let mask = |uv: &Vec2| zone.mask.sample(uv.x, uv.y, 0);
     if most(places.iter().map(mask)) < LEAST_WEIGHT {

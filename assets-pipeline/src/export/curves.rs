@@ -323,6 +323,24 @@ fn join_lines(pieces: &[Piece], tolerance: f64) -> Vec<(&Piece, &Piece)> {
     joined
 }
 
+/// Frames of which straight lines pass the values of all others within the tolerance; the first and the last stay.
+/// Where nothing changes one frame is enough.
+pub(super) fn kept_frames(values: &[Vec<f32>], tolerance: f32) -> Vec<usize> {
+    let Some(first) = values.first() else { return Vec::new() };
+    if values.iter().all(|v| v == first) {
+        return vec![0];
+    }
+    let line = |i: usize, a: &Vec<f32>, b: &Vec<f32>| Piece {
+        start_s: i as f64,
+        end_s: (i + 1) as f64,
+        jump: false,
+        samples: std::array::from_fn(|k| if k + 1 == SAMPLES { b.clone() } else { a.clone() }),
+    };
+    let pieces: Vec<Piece> = values.windows(2).enumerate().map(|(i, w)| line(i, &w[0], &w[1])).collect();
+    let joined = join_lines(&pieces, f64::from(tolerance));
+    std::iter::once(0).chain(joined.iter().map(|(_, last)| last.end_s as usize)).collect()
+}
+
 /// Halves pieces until a cubic fits each.
 fn halve(f: &dyn Fn(f64) -> Vec<f32>, pieces: Vec<Piece>, tolerance: f64) -> Vec<Piece> {
     let mut out = Vec::new();
@@ -478,6 +496,26 @@ mod tests {
         let worst = (0..=10_000).map(|i| error(f64::from(i) * 1e-4)).fold(0.0, f32::max);
         assert!(worst < 2.0 / 32768.0 + 1e-6, "{worst}");
         assert!(curve.keys.len() < 40, "{}", curve.keys.len());
+    }
+
+    #[test]
+    fn kept_frames_pass_all_others() {
+        let values: Vec<Vec<f32>> =
+            (0..100).map(|i| vec![(i as f32 * 0.03).sin(), if i < 50 { 0.0 } else { 1.0 }]).collect();
+        let kept = kept_frames(&values, 1e-3);
+        assert!(kept.len() < 40 && kept[0] == 0 && *kept.last().unwrap() == 99, "{kept:?}");
+        assert!(kept.contains(&49) && kept.contains(&50));
+        for w in kept.windows(2) {
+            for i in w[0]..=w[1] {
+                let share = (i - w[0]) as f32 / (w[1] - w[0]) as f32;
+                for c in 0..2 {
+                    let line = values[w[0]][c] + share * (values[w[1]][c] - values[w[0]][c]);
+                    assert!((line - values[i][c]).abs() <= 1.001e-3, "{i}");
+                }
+            }
+        }
+        assert_eq!(kept_frames(&values, 0.0).len(), 100);
+        assert_eq!(kept_frames(&vec![vec![0.5]; 9], 0.0), [0]);
     }
 
     #[test]

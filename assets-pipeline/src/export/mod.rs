@@ -6,6 +6,7 @@ mod image_codec;
 mod performance;
 mod pictures;
 pub mod skin_color;
+pub mod usd;
 
 use std::fs;
 use std::io::Write;

@@ -12,12 +12,15 @@ mod accessor;
 mod document;
 mod foreign;
 mod lint;
+mod motion;
 mod own;
+mod placement;
 
 use std::fs;
 use std::path::Path;
 
 use rubor_rig::head::Head;
+use rubor_rig::timeline::Sequence;
 
 use self::document::Document;
 pub use self::lint::lint;
@@ -33,6 +36,8 @@ pub struct ImportedHead {
     pub rig: Option<serde_json::Value>,
     /// The sequence file that its animation was made from.
     pub sequence: Option<serde_json::Value>,
+    /// Its first animation as tracks: what other programs keyed.
+    pub animation: Option<Sequence>,
 }
 
 /// Reads a `.glb` or `.gltf`. Buffers and images may be in the file, in data URIs, or in files of the same folder or
@@ -51,10 +56,11 @@ pub fn read(path: &Path) -> Result<ImportedHead, ImportError> {
 /// As [`read`].
 pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError> {
     let document = Document::load(bytes, path)?;
-    let imported = match document.gltf.extension_value(NAME) {
+    let mut imported = match document.gltf.extension_value(NAME) {
         Some(extension) => own::read(&document, extension)?,
         None => ImportedHead { head: foreign::read(&document)?, ..ImportedHead::default() },
     };
     imported.head.validate()?;
+    imported.animation = motion::read(&document)?;
     Ok(imported)
 }
