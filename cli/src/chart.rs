@@ -95,6 +95,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             size: arguments.size,
             scatter,
             transmit,
+            appearance: rubor_renderer::AppearanceMethods::default(),
             profile: Arc::new(Profile::deon_six()),
             antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
             supersampling: 1,

@@ -19,6 +19,7 @@
 
 mod environment;
 mod error;
+pub mod footprint;
 mod frame;
 mod gpu;
 mod head;
@@ -38,6 +39,7 @@ pub use head::{
     ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
 };
 pub use passes::antialias;
+pub use passes::appearance::{AppearanceMethods, ColorMethod, WrinkleMethod};
 pub use passes::scatter::ScatterMethod;
 pub use passes::shade::TransmitMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
