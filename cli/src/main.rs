@@ -9,6 +9,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod adapters;
+mod antialias_method;
+mod bench;
 mod capture;
 mod chart;
 mod compare;
@@ -62,6 +64,8 @@ enum Command {
     Compare(compare::Arguments),
     /// Chart the cost and the error of scattering methods
     Chart(chart::Arguments),
+    /// Measure what each pass of a frame costs on the GPU
+    Bench(bench::Arguments),
     /// Print a diffusion profile: R(r), Gaussians, transmittance
     Profile(profile::Arguments),
     /// Print a separable kernel of a profile
@@ -83,6 +87,7 @@ fn main() -> ExitCode {
         Command::Filter(a) => filter::run(&a),
         Command::Compare(a) => compare::run(&a),
         Command::Chart(a) => chart::run(&a),
+        Command::Bench(a) => bench::run(&a),
         Command::Profile(a) => profile::run(&a),
         Command::Kernel(a) => kernel::run(&a),
         Command::Adapters(a) => adapters::run(&a),

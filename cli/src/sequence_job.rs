@@ -8,27 +8,25 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
 use rubor_renderer::{
-    AppearanceMethods, ColorMethod, Gpu, Image, Renderer, ScatterMethod, Settings, TransmitMethod,
-    WrinkleMethod, antialias,
+    AppearanceMethods, ColorMethod, Gpu, Image, Renderer, ScatterMethod, TransmitMethod, WrinkleMethod,
 };
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
-use rubor_rig::skin::profile::Profile;
 use rubor_rig::timeline::Sequence;
 use serde_json::json;
 
+use crate::antialias_method::{Antialias, parse_antialias};
 use crate::failure::{Failure, Outcome};
 use crate::inputs::LoadedHead;
 use crate::progress::Progress;
-use crate::studio::Studio;
+use crate::studio::{self, Studio};
 use crate::video::Video;
 use crate::{contact_sheet, inset, output, video};
 
@@ -87,13 +85,6 @@ pub(crate) struct Arguments {
     pub(crate) json: bool,
 }
 
-/// An antialiasing method by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Antialias {
-    Filter(antialias::Mode),
-    Supersampling(u32),
-}
-
 /// Numbers of frames from 1, ascending, each once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct FrameList(Vec<u32>);
@@ -111,19 +102,6 @@ fn parse_frames(text: &str) -> Result<FrameList, String> {
         numbers.extend(first..=last);
     }
     Ok(FrameList(numbers.into_iter().collect()))
-}
-
-fn parse_antialias(text: &str) -> Result<Antialias, String> {
-    if let Some(mode) = antialias::Mode::ALL.into_iter().find(|mode| mode.name() == text) {
-        return Ok(Antialias::Filter(mode));
-    }
-    match text.strip_prefix("ssaa:").and_then(|n| n.parse().ok()) {
-        Some(n) if (1..=8).contains(&n) => Ok(Antialias::Supersampling(n)),
-        _ => {
-            let names = antialias::Mode::ALL.map(antialias::Mode::name).join(", ");
-            Err(format!("found {text:?}, expected {names}, or ssaa:N with N from 1 to 8"))
-        }
-    }
 }
 
 /// What to draw.
@@ -149,7 +127,14 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         job.sequence.fps = fps;
     }
     let size = arguments.size.or(job.sequence.size).unwrap_or([640, 640]);
-    let settings = settings(size, arguments)?;
+    let mut settings = studio::settings(
+        size,
+        arguments.scatter,
+        arguments.transmit,
+        arguments.antialias,
+        arguments.exposure,
+    );
+    settings.appearance = AppearanceMethods { color: arguments.color, wrinkles: arguments.wrinkles };
     let mut evaluators = Vec::new();
     for loaded in &job.heads {
         let (evaluator, notes) = Evaluator::new(&loaded.head, &job.rig, &job.sequence)?;
@@ -229,7 +214,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         "transmit": arguments.transmit.to_string(),
         "color": arguments.color.to_string(),
         "wrinkles": arguments.wrinkles.to_string(),
-        "antialias": format!("{:?}", arguments.antialias),
+        "antialias": arguments.antialias.to_string(),
         "secondsToFirstFrame": first_frame_s,
         "secondsPerFrame": median(&mut drawn),
         "gpuMillisecondsPerPass": times.medians(),
@@ -258,24 +243,6 @@ fn chosen_frames(count: u32, list: Option<&FrameList>) -> Outcome<Vec<u32>> {
     }
 }
 
-fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
-    let (mode, supersampling) = match arguments.antialias {
-        Antialias::Filter(mode) => (mode, 1),
-        Antialias::Supersampling(n) => (antialias::Mode::None, n),
-    };
-    Ok(Settings {
-        size,
-        scatter: arguments.scatter,
-        transmit: arguments.transmit,
-        appearance: AppearanceMethods { color: arguments.color, wrinkles: arguments.wrinkles },
-        profile: Arc::new(Profile::deon_six()),
-        antialias: antialias::Settings::new(mode, antialias::Preset::High),
-        supersampling,
-        shadow_size: 2048,
-        exposure: arguments.exposure,
-    })
-}
-
 /// Writes down what job the folder holds. False where a stopped run of the same job goes on.
 fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<bool> {
     let content = json!({
@@ -288,7 +255,7 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
         "color": arguments.color.to_string(),
         "wrinkles": arguments.wrinkles.to_string(),
         "inset": arguments.inset.map(|i| format!("{i:?}")),
-        "antialias": format!("{:?}", arguments.antialias),
+        "antialias": arguments.antialias.to_string(),
         "exposure": arguments.exposure,
         "program": env!("CARGO_PKG_VERSION"),
     });
@@ -424,9 +391,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn methods_are_read_by_name() {
-        assert_eq!(parse_antialias("ssaa:4"), Ok(Antialias::Supersampling(4)));
-        assert!(parse_antialias("ssaa:0").is_err());
+    fn frame_lists_are_read() {
         assert_eq!(parse_frames("3, 1-2,2"), Ok(FrameList(vec![1, 2, 3])));
         for wrong in ["", "0", "4-3", "a", "1,,2"] {
             assert!(parse_frames(wrong).unwrap_err().contains(wrong));

@@ -7,8 +7,9 @@ use rubor_rig::skin::profile::Profile;
 use serde::Serialize;
 
 use crate::error::RenderError;
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::{GpuVertex, HeadOnGpu};
+use crate::pass_timer::{FrameLog, FrameTimes, PassTimer};
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::{Appearance, AppearanceMethods, Blended, ColorMethod};
 use crate::passes::compose::Compose;
@@ -23,6 +24,7 @@ use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
 use crate::passes::velocity::{Moving, Velocity};
 use crate::passes::visibility::Visibility;
 use crate::scene::{Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
+use crate::targets::Targets;
 
 /// How frames are made.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +72,9 @@ pub struct FrameStats {
     /// Relative standard error of the diffuse light, for `reference-surface`.
     pub scatter_noise: Option<f64>,
 }
+
+/// Frames that [`Renderer::measure`] hands to the device before it waits: enough to keep it busy.
+const FRAMES_IN_FLIGHT: usize = 3;
 
 /// The view as view.wgsl reads it.
 #[repr(C)]
@@ -124,29 +129,6 @@ struct Past {
     frames: u64,
 }
 
-/// Images between passes.
-struct Targets {
-    size: [u32; 2],
-    samples: Vec<SampleTargets>,
-    velocity: Option<wgpu::TextureView>,
-    image: wgpu::Texture,
-    irradiance: wgpu::TextureView,
-    albedo: wgpu::TextureView,
-    direct: wgpu::TextureView,
-    scratch: wgpu::TextureView,
-    scattered: wgpu::TextureView,
-    hdr: wgpu::TextureView,
-    shadows: wgpu::Texture,
-}
-
-/// Images of one sample of each pixel.
-struct SampleTargets {
-    ids: wgpu::TextureView,
-    depth: wgpu::TextureView,
-    /// Encoded for display, before antialiasing.
-    displayed: wgpu::TextureView,
-}
-
 /// Buffers of one head of a scene.
 struct Instance {
     positions: wgpu::Buffer,
@@ -155,85 +137,9 @@ struct Instance {
     blended: Blended,
 }
 
-impl Targets {
-    fn new(gpu: &Gpu, settings: &Settings, shadow_layers: u32) -> Self {
-        use wgpu::TextureFormat::{Depth32Float, R32Uint, Rgba8Unorm, Rgba16Float};
-        use wgpu::TextureUsages as Use;
-        let size = settings.frame_size();
-        let storage = Use::STORAGE_BINDING;
-        let view = |label, size, format, usage| {
-            gpu.target(label, size, format, usage | Use::TEXTURE_BINDING | Use::COPY_SRC)
-                .create_view(&Default::default())
-        };
-        let light = |label| view(label, size, Rgba16Float, storage);
-        let mode = settings.antialias.mode;
-        let samples = mode
-            .subsamples(0)
-            .iter()
-            .map(|_| SampleTargets {
-                ids: view("ids", size, R32Uint, Use::RENDER_ATTACHMENT),
-                depth: view("depth", size, Depth32Float, Use::RENDER_ATTACHMENT),
-                displayed: view("displayed", settings.size, Rgba8Unorm, storage),
-            })
-            .collect();
-        let shadows = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("shadows"),
-            size: wgpu::Extent3d {
-                width: settings.shadow_size,
-                height: settings.shadow_size,
-                depth_or_array_layers: shadow_layers.max(1),
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: Depth32Float,
-            usage: Use::RENDER_ATTACHMENT | Use::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        Self {
-            size,
-            samples,
-            velocity: mode.is_temporal().then(|| light("velocity")),
-            image: gpu.target(
-                "image",
-                settings.size,
-                Rgba8Unorm,
-                storage | Use::COPY_SRC | Use::TEXTURE_BINDING,
-            ),
-            irradiance: light("irradiance"),
-            albedo: light("albedo"),
-            direct: light("direct"),
-            scratch: light("scratch"),
-            scattered: light("scattered"),
-            hdr: view("hdr", size, Rgba16Float, storage | Use::RENDER_ATTACHMENT),
-            shadows,
-        }
-    }
-
-    fn matches(&self, settings: &Settings, shadow_layers: u32) -> bool {
-        let mode = settings.antialias.mode;
-        self.size == settings.frame_size()
-            && [self.image.width(), self.image.height()] == settings.size
-            && self.samples.len() == mode.subsamples(0).len()
-            && self.velocity.is_some() == mode.is_temporal()
-            && self.shadows.width() == settings.shadow_size
-            && self.shadows.depth_or_array_layers() >= shadow_layers
-    }
-
-    fn bytes(&self) -> u64 {
-        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
-        let image = u64::from(self.image.width()) * u64::from(self.image.height()) * 4;
-        let samples = self.samples.len() as u64;
-        let s = self.shadows.size();
-        let shadow = u64::from(s.width) * u64::from(s.height) * u64::from(s.depth_or_array_layers) * 4;
-        let lights = 6 + u64::from(self.velocity.is_some());
-        pixels * (samples * 8 + lights * 8) + image * (1 + samples) + shadow
-    }
-}
-
 impl Settings {
     /// Pixels that the passes before display draw.
-    fn frame_size(&self) -> [u32; 2] {
+    pub(crate) fn frame_size(&self) -> [u32; 2] {
         self.size.map(|n| n * self.supersampling)
     }
 }
@@ -289,6 +195,73 @@ impl Renderer {
         scene: &Scene<'_>,
         settings: &Settings,
     ) -> Result<(Image, FrameStats), RenderError> {
+        self.prepare(scene, settings)?;
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let scatter_noise = self.record_frame(&mut encoder, scene, settings)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
+        let image =
+            if self.antialias.is_some() { &targets.image } else { targets.samples[0].displayed.texture() };
+        let rgba = self.gpu.read_texture(image)?;
+        let stats = FrameStats {
+            passes_ms: self.timer.read(&self.gpu)?,
+            scatter_noise,
+            triangles: scene
+                .heads
+                .iter()
+                .map(|h| u64::from(h.head.opaque_triangles + h.head.overlay_triangles))
+                .sum(),
+            memory_bytes: self.memory_bytes(scene),
+        };
+        Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
+    }
+
+    /// Draws a scene `frames` times, one frame right after the other and without reading any picture, and says what each
+    /// cost; the first `warm_up` of them are left out. Empty where the adapter has no timestamps.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`]; `reference-surface`, which is not drawn in one go.
+    pub fn measure(
+        &mut self,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        warm_up: u32,
+        frames: u32,
+    ) -> Result<Vec<FrameTimes>, RenderError> {
+        if let ScatterMethod::ReferenceSurface(_) = settings.scatter {
+            return Err(RenderError::Limit {
+                what: "method to measure",
+                found: settings.scatter.to_string(),
+                expected: "one that draws a frame in one go".into(),
+            });
+        }
+        self.prepare(scene, settings)?;
+        let mut log = FrameLog::new(&self.gpu, frames);
+        let mut submissions = std::collections::VecDeque::new();
+        for frame in 0..warm_up + frames {
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            self.record_frame(&mut encoder, scene, settings)?;
+            if frame >= warm_up {
+                self.timer.append(&mut encoder, &mut log);
+            }
+            submissions.push_back(self.gpu.queue.submit([encoder.finish()]));
+            if submissions.len() > FRAMES_IN_FLIGHT {
+                self.gpu.wait(submissions.pop_front())?;
+            }
+        }
+        log.read(&self.gpu)
+    }
+
+    /// Bytes of heads, buffers and images of the last frame.
+    fn memory_bytes(&self, scene: &Scene<'_>) -> u64 {
+        self.targets.as_ref().map_or(0, Targets::bytes)
+            + self.antialias.as_ref().map_or(0, Antialias::memory_bytes)
+            + self.past.history.as_ref().map_or(0, History::memory_bytes)
+            + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()
+    }
+
+    /// Checks a scene and makes what its frames need.
+    fn prepare(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
         self.check(scene, settings)?;
         let shadow_layers = scene.lights.iter().filter(|l| l.casts_shadow).count() as u32;
         if !self.targets.as_ref().is_some_and(|t| t.matches(settings, shadow_layers)) {
@@ -314,24 +287,7 @@ impl Renderer {
             self.shade.prepare_samples(&self.gpu);
         }
         self.is_scattered = settings.scatter != ScatterMethod::None;
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let scatter_noise = self.record_frame(&mut encoder, scene, settings)?;
-        self.gpu.queue.submit([encoder.finish()]);
-        let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
-        let image =
-            if self.antialias.is_some() { &targets.image } else { targets.samples[0].displayed.texture() };
-        let rgba = self.gpu.read_texture(image)?;
-        let heads = scene.heads.iter().map(|h| h.head);
-        let stats = FrameStats {
-            passes_ms: self.timer.read(&self.gpu)?,
-            scatter_noise,
-            triangles: heads.clone().map(|h| u64::from(h.opaque_triangles + h.overlay_triangles)).sum(),
-            memory_bytes: targets.bytes()
-                + self.antialias.as_ref().map_or(0, Antialias::memory_bytes)
-                + self.past.history.as_ref().map_or(0, History::memory_bytes)
-                + heads.map(|h| h.memory_bytes).sum::<u64>(),
-        };
-        Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
+        Ok(())
     }
 
     /// Deformed points of the first head of the last frame, world space, metres.

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, resize_area};
+use wgpu::util::DeviceExt;
 
 use crate::error::RenderError;
 use crate::footprint::mask_size;
@@ -49,6 +50,8 @@ pub(crate) struct GpuVertex {
 pub struct HeadOnGpu {
     pub(crate) point_count: u32,
     pub(crate) vertex_count: u32,
+    /// Points at the corners of the opaque triangles: an index buffer.
+    pub(crate) opaque_points: wgpu::Buffer,
     pub(crate) opaque_triangles: u32,
     pub(crate) overlay_triangles: u32,
     pub(crate) shape_count: usize,
@@ -114,6 +117,8 @@ impl HeadOnGpu {
             .map(|v| GpuVertex { point: v.point, u: v.uv.x, v: v.uv.y, padding: 0 })
             .collect();
         let (triangles, opaque, overlay) = ordered_triangles(head);
+        let corners = triangles[..opaque as usize].iter().flat_map(|t| &t[..3]);
+        let opaque_points: Vec<u32> = corners.map(|v| mesh.vertices[*v as usize].point).collect();
         let (ring_starts, ring) = rings(head, &triangles);
         let maps = upload_maps(gpu, head);
         let texels = color.texels.iter().map(|c| [c[0], c[1], c[2], 1.0]).collect();
@@ -123,6 +128,7 @@ impl HeadOnGpu {
         let mut result = Self {
             point_count: mesh.points.len() as u32,
             vertex_count: mesh.vertices.len() as u32,
+            opaque_points: index_buffer(gpu, &opaque_points),
             opaque_triangles: opaque,
             overlay_triangles: overlay,
             shape_count: head.shapes.len(),
@@ -156,6 +162,7 @@ impl HeadOnGpu {
             &self.triangles,
             &self.ring_starts,
             &self.ring,
+            &self.opaque_points,
         ];
         buffers.iter().map(|b| b.size()).sum::<u64>() + self.map_bytes()
     }
@@ -220,6 +227,18 @@ fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, u32, u32) {
     triangles.extend(of(&|m| !m.is_opaque() && m != Material::Hidden));
     let overlay = triangles.len() as u32 - opaque;
     (triangles, opaque, overlay)
+}
+
+fn index_buffer(gpu: &Gpu, indices: &[u32]) -> wgpu::Buffer {
+    let usage = wgpu::BufferUsages::INDEX | wgpu::BufferUsages::STORAGE;
+    // An empty buffer cannot be bound.
+    let contents: &[u32] = if indices.is_empty() { &[0] } else { indices };
+    let contents = bytemuck::cast_slice(contents);
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("opaque points"),
+        contents,
+        usage,
+    })
 }
 
 /// Triangles around each point: starts (one more than points) and indices into `triangles`.

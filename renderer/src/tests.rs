@@ -32,7 +32,8 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     assert_eq!(validated_workgroups(compose::SHADER), square("compose"));
     assert_eq!(validated_workgroups(display::SHADER), square("display"));
     assert_eq!(validated_workgroups(velocity::SHADER), square("velocity_main"));
-    for raster in [shadow::SHADER, visibility::SHADER, overlay::SHADER] {
+    let visibility = [true, false].map(visibility::shader);
+    for raster in [shadow::SHADER, &visibility[0], &visibility[1], overlay::SHADER] {
         assert_eq!(validated_workgroups(raster), []);
     }
 }
@@ -40,7 +41,7 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
 #[test]
 fn structs_are_laid_out_alike_on_both_sides() {
     assert_layout(
-        visibility::SHADER,
+        &visibility::shader(false),
         "View",
         size_of::<View>(),
         &offsets!(View; clip_from_world as "clip_from_world",
@@ -50,7 +51,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             light_count as "light_count", shading_jitter as "shading_jitter"),
     );
     assert_layout(
-        visibility::SHADER,
+        &visibility::shader(false),
         "Vertex",
         size_of::<GpuVertex>(),
         &offsets!(GpuVertex; point as "point", u as "u", v as "v"),
@@ -155,7 +156,8 @@ pub(crate) fn dome() -> Head {
     Head { name: "dome".into(), mesh, shapes, maps, ..Head::default() }
 }
 
-pub(crate) const WHITE_TABLE: ColorTable<'static> = ColorTable { width: 2, height: 2, texels: &[[0.8; 3]; 4] };
+pub(crate) const WHITE_TABLE: ColorTable<'static> =
+    ColorTable { width: 2, height: 2, texels: &[[0.8; 3]; 4] };
 
 pub(crate) fn renderer() -> Option<Renderer> {
     gpu()?;

@@ -18,8 +18,9 @@ mod method;
 
 pub use method::{AppearanceMethods, ColorMethod, WrinkleMethod};
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::{APPEARANCE_SIZE, MAX_DISTRIBUTIONS, MAX_ZONES, MapsOnGpu};
+use crate::pass_timer::PassTimer;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = include_str!("appearance.wgsl");

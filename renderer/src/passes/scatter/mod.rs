@@ -18,7 +18,8 @@ use std::sync::Arc;
 use rubor_rig::skin::profile::Profile;
 
 use crate::error::RenderError;
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
 
 pub(crate) mod disk;
 pub(crate) mod exact;

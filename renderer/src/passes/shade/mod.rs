@@ -30,8 +30,9 @@ use rubor_rig::skin::transmittance::TransmittanceTable;
 
 use crate::environment::Environment;
 use crate::error::RenderError;
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
+use crate::pass_timer::PassTimer;
 use crate::passes::appearance::{Blended, WrinkleMethod};
 use crate::passes::shadow::LightView;
 use crate::scene::{Light, LightKind, MAX_LIGHTS};

@@ -16,7 +16,8 @@
 //! skin, or whose kernels are under half a pixel, only copy. Kernels that reach over more than 48 pixels read the images.
 //! On software adapters, where barriers cost more than loads, every pixel reads the images.
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
 use crate::passes::scatter::FOLLOW_PER_MM;
 
 /// Pixels of a tile along the blur and across it.

@@ -21,7 +21,8 @@ use rubor_rig::head::Material;
 use rubor_rig::skin::profile::Profile;
 
 use crate::error::RenderError;
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
 
 #[cfg(test)]
 mod tests;
