@@ -22,6 +22,7 @@ mod failure;
 mod filter;
 mod gallery;
 mod import;
+mod inset;
 mod inputs;
 mod kernel;
 mod maps;
@@ -90,7 +91,7 @@ fn main() -> ExitCode {
         Command::Export(a) => export::run(&a),
         Command::Check(a) => check::run(&a),
         Command::Maya(a) => maya::run(&a),
-        Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
+        Command::Maps(a) => maps::run(&a),
         Command::Filter(a) => filter::run(&a),
         Command::Compare(a) => compare::run(&a),
         Command::Chart(a) => chart::run(&a),

@@ -12,7 +12,9 @@ use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
-use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, TransmitMethod};
+use rubor_renderer::{
+    AppearanceMethods, ColorMethod, Gpu, Image, Renderer, ScatterMethod, TransmitMethod, WrinkleMethod,
+};
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
@@ -25,7 +27,7 @@ use crate::inputs::LoadedHead;
 use crate::progress::Progress;
 use crate::studio::{self, Studio};
 use crate::video::Video;
-use crate::{contact_sheet, output, video};
+use crate::{contact_sheet, inset, output, video};
 
 /// What `render` and `demo` have in common.
 #[derive(Clone, clap::Args)]
@@ -47,6 +49,15 @@ pub(crate) struct Arguments {
     /// Light through thin parts: none or shadow-depth
     #[arg(long, default_value = "shadow-depth", value_name = "METHOD")]
     pub(crate) transmit: TransmitMethod,
+    /// Colour of the skin: hemoglobin (blood moves) or static
+    #[arg(long, default_value = "hemoglobin", value_name = "METHOD")]
+    pub(crate) color: ColorMethod,
+    /// Wrinkles: none, partial-derivative (slopes add) or difference (differences of normals add)
+    #[arg(long, default_value = "partial-derivative", value_name = "METHOD")]
+    pub(crate) wrinkles: WrinkleMethod,
+    /// Draw a map of the moment of the (first) head into a corner: hemoglobin (dark is more) or wrinkles
+    #[arg(long, value_enum, value_name = "MAP")]
+    pub(crate) inset: Option<inset::Map>,
     /// Antialiasing: none, mlaa, smaa-1x, smaa-s2x, smaa-t2x, smaa-4x, or ssaa:N with N x N samples a pixel
     #[arg(long, default_value = "smaa-s2x", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
@@ -115,13 +126,14 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         job.sequence.fps = fps;
     }
     let size = arguments.size.or(job.sequence.size).unwrap_or([640, 640]);
-    let settings = studio::settings(
+    let mut settings = studio::settings(
         size,
         arguments.scatter,
         arguments.transmit,
         arguments.antialias,
         arguments.exposure,
     );
+    settings.appearance = AppearanceMethods { color: arguments.color, wrinkles: arguments.wrinkles };
     let mut evaluators = Vec::new();
     for loaded in &job.heads {
         let (evaluator, notes) = Evaluator::new(&loaded.head, &job.rig, &job.sequence)?;
@@ -140,6 +152,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     let spacing = heads.iter().map(|h| width(h)).fold(0.0, f32::max) * SPACING;
     let mut studio = Studio::new(renderer, &heads)?;
 
+    let mut inset = arguments.inset.map(|map| inset::Inset::new(map, heads[0])).transpose()?;
     let mut sheet = Vec::new();
     let on_sheet = contact_sheet::choose(frames.len() as u32);
     let mut times = PassTimes::default();
@@ -160,8 +173,12 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
                     studio.render(&shots_of(&evaluators, frame - 1), spacing, &settings)?;
                 }
                 drawn_last = Some(frame);
-                let (image, stats) = studio.render(&shots_of(&evaluators, frame), spacing, &settings)?;
-                let picture = opaque(image);
+                let shots = shots_of(&evaluators, frame);
+                let (image, stats) = studio.render(&shots, spacing, &settings)?;
+                let mut picture = opaque(image);
+                if let (Some(inset), Some(shot)) = (&mut inset, shots.first()) {
+                    inset.draw(&shot.face, settings.appearance, &mut picture);
+                }
                 write_png(&path, &picture)?;
                 first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
                 drawn.push(at.elapsed().as_secs_f64());
@@ -194,12 +211,15 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         "framesDrawn": drawn.len(),
         "scatter": arguments.scatter.to_string(),
         "transmit": arguments.transmit.to_string(),
+        "color": arguments.color.to_string(),
+        "wrinkles": arguments.wrinkles.to_string(),
         "antialias": arguments.antialias.to_string(),
         "secondsToFirstFrame": first_frame_s,
         "secondsPerFrame": median(&mut drawn),
         "gpuMillisecondsPerPass": times.medians(),
         "triangles": times.triangles,
         "deviceMemoryBytes": times.memory_bytes,
+        "mapTextures": heads.first().map(|h| rubor_renderer::footprint::of_maps(&h.maps)),
     });
     let text = serde_json::to_string_pretty(&stats).map_err(Failure::job)?;
     output::write(&arguments.output.join(STATS_FILE), text.as_bytes())?;
@@ -231,6 +251,9 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
         "size": size,
         "scatter": arguments.scatter.to_string(),
         "transmit": arguments.transmit.to_string(),
+        "color": arguments.color.to_string(),
+        "wrinkles": arguments.wrinkles.to_string(),
+        "inset": arguments.inset.map(|i| format!("{i:?}")),
         "antialias": arguments.antialias.to_string(),
         "exposure": arguments.exposure,
         "program": env!("CARGO_PKG_VERSION"),
