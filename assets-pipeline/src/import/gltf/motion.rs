@@ -262,10 +262,7 @@ fn head_motion(sequence: &mut Sequence, node: &Node<'_>, [rotation, translation]
 }
 
 /// A key a frame, or a constant.
-fn keyed<A: PartialEq, T: Copy>(values: &[A], fps: f64, value: impl Fn(&A) -> T) -> Track<T>
-where
-    T: Default,
-{
+fn keyed<A: PartialEq, T: Copy + Default>(values: &[A], fps: f64, value: impl Fn(&A) -> T) -> Track<T> {
     match values {
         [] => Track::Constant(T::default()),
         [first, rest @ ..] if rest.iter().all(|v| v == first) => Track::Constant(value(first)),
