@@ -459,6 +459,11 @@ fn a_head_without_expression_maps_gets_predicted_ones() {
     let rig = imported.rig.expect("a rig");
     assert_eq!(rig["expressions"]["kiss"]["hemoglobin"]["kiss"], 1.0);
     assert!(rig["expressions"]["kiss"]["wrinkles"]["chin"].as_f64().is_some_and(|w| w > 0.4));
+    // Fitted to its own prediction, the model is what it was.
+    let fitted = done(&["predict", &out, "--fit"]);
+    let coefficient = fitted["model"]["bias_per_compression"].as_f64();
+    assert!(coefficient.is_some_and(|c| (c - 0.6).abs() < 0.02), "{coefficient:?}");
+    refused(&folder, &["predict", &file, "--fit"], &["--fit", "no distribution"]);
     // Without an output it only says how far prediction and maps agree.
     let report = done(&["predict", &out]);
     assert_eq!(report["expressions"][0]["name"], "kiss");

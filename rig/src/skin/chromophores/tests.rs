@@ -69,6 +69,13 @@ fn a_skin_without_absorption_returns_all_that_enters() {
     let base = directions.half_space(grey);
     let [a, b] = [0.01, 3.0].map(|t| directions.reflectance(grey, t, &base));
     assert!((a - b).abs() < 1e-9, "{a} {b}");
+    // And so are three, however they share the depth.
+    let three = directions.reflectance(grey, 0.02, &directions.over(grey, 0.1, &base));
+    assert!((a - three).abs() < 1e-9, "{a} {three}");
+    let odd = coefficients::Medium { absorption_per_mm: 3.0, scattering_per_mm: 6.0 };
+    let once = directions.reflectance(grey, 0.05, &directions.over(odd, 0.07, &base));
+    let split = directions.over(odd, 0.03, &directions.over(odd, 0.04, &base));
+    assert!((once - directions.reflectance(grey, 0.05, &split)).abs() < 1e-9);
     // Without a surface and at normal incidence an isotropic half space has Chandrasekhar's H functions:
     // R = 1 - H(1) sqrt(1 - omega), H(1) = 2.0771 at omega = 0.9 (his table XI gives H to 4 digits).
     let open = layers::Directions::new(1.0);
