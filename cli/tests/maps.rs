@@ -515,7 +515,8 @@ fn a_new_map_shows_in_the_picture() {
     let picture = |extra: &[&str]| {
         let frames = folder.path("frames");
         let common = ["render", "--head", &out, "--sequence", &sequence, "-o", &frames, "--size", "96x96"];
-        let output = rubor(&[&common, &["--no-export", "--no-video", "--antialias", "none"], extra].concat());
+        let plain = ["--no-export", "--no-video", "--antialias", "none"];
+        let output = rubor(&[&common[..], &plain, extra].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         image::open(Path::new(&frames).join("frame.0001.png")).expect("a frame").into_rgb8()
     };

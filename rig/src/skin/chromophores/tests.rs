@@ -135,9 +135,9 @@ fn melanin_darkens_and_blood_reddens() {
                 assert!(next[0] < here[0], "L* grows with hemoglobin at {i} {j}");
                 // Beyond about 10 % blood skin darkens as a whole and a* levels off with L*; redness for its
                 // lightness still grows.
-                // Dark skin hides its blood.
+                // Dark skin hides its blood, and beyond a quarter of blood the horny layer is most of what is seen.
                 let [m, h] = fractions_at(f64::from(i) / 40.0, f64::from(j + 1) / 40.0);
-                if m < 0.1 {
+                if m < 0.1 && h < 0.25 {
                     let redness = |lab: [f64; 3]| lab[1] / lab[0];
                     assert!(redness(next) > redness(here), "redness falls with hemoglobin at {i} {j}");
                 }
