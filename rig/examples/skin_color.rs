@@ -97,9 +97,16 @@ fn published() {
     }
     println!("mean CIEDE2000: Xiao, de Rigal, ColorChecker, Monk; tone 8 alone");
     for eumelanin_share in [0.61, 0.74, 0.87] {
-        for [epidermis_thickness_mm, stratum_corneum_thickness_mm] in
-            [[0.05, 0.004], [0.05, 0.008], [0.06, 0.0], [0.06, 0.004], [0.06, 0.006], [0.06, 0.008], [0.06, 0.012], [0.08, 0.006]]
-        {
+        for [epidermis_thickness_mm, stratum_corneum_thickness_mm] in [
+            [0.05, 0.004],
+            [0.05, 0.008],
+            [0.06, 0.0],
+            [0.06, 0.004],
+            [0.06, 0.006],
+            [0.06, 0.008],
+            [0.06, 0.012],
+            [0.08, 0.006],
+        ] {
             let model = ChromophoreModel {
                 eumelanin_share,
                 epidermis_thickness_mm,

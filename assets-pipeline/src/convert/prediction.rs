@@ -31,8 +31,7 @@ pub struct Prediction {
 /// # Panics
 /// When `deformed` has another length than the head's points.
 pub fn predict(head: &Head, model: &StrainModel, name: &str, deformed: &[Vec3], mean: &Map) -> Prediction {
-    let strain: Vec<_> =
-        point_strain(&head.mesh, deformed).iter().map(|s| model.predict(s)).collect();
+    let strain: Vec<_> = point_strain(&head.mesh, deformed).iter().map(|s| model.predict(s)).collect();
     let texels = SkinTexels::new(head, mean.width, mean.height);
     let field = |value: fn(&rubor_rig::strain::StrainPrediction) -> f32| {
         texels.map_of_points(&strain.iter().map(value).collect::<Vec<_>>())
@@ -128,7 +127,8 @@ mod tests {
     fn a_squeezed_sheet_drains_everywhere_and_wrinkles_in_its_zones() {
         let mut head = sheet(Vec2::ZERO, Vec2::new(0.5, 1.0));
         head.maps.wrinkle_slopes = vec![Map::filled(1, 1, &[0.1, 0.0])];
-        let zone = |name: &str, v| WrinkleZone { name: name.into(), wrinkle_map: 0, mask: Map::filled(2, 2, &[v]) };
+        let zone =
+            |name: &str, v| WrinkleZone { name: name.into(), wrinkle_map: 0, mask: Map::filled(2, 2, &[v]) };
         head.maps.zones = vec![zone("all", 1.0), zone("none", 0.0)];
         let squeezed: Vec<Vec3> = head.mesh.points.iter().map(|p| Vec3::new(0.8 * p.x, p.y, p.z)).collect();
         let mean = Map::filled(16, 16, &[0.05]);
@@ -146,17 +146,26 @@ mod tests {
     #[test]
     fn a_fit_finds_the_coefficients_that_made_the_maps() {
         let head = sheet(Vec2::ZERO, Vec2::ONE);
-        let truth = StrainModel { bias_per_compression: -0.7, bias_per_stretch: 0.2, scale_per_area: 1.1, ..Default::default() };
+        let truth = StrainModel {
+            bias_per_compression: -0.7,
+            bias_per_stretch: 0.2,
+            scale_per_area: 1.1,
+            ..Default::default()
+        };
         let mean = Map::filled(16, 16, &[0.05]);
-        let moved = |f: f32| -> Vec<Vec3> { head.mesh.points.iter().map(|p| Vec3::new(f * p.x, p.y, p.z)).collect() };
-        let distributions = [0.8, 1.3].map(|f| predict(&head, &truth, "state", &moved(f), &mean).distribution);
+        let moved =
+            |f: f32| -> Vec<Vec3> { head.mesh.points.iter().map(|p| Vec3::new(f * p.x, p.y, p.z)).collect() };
+        let distributions =
+            [0.8, 1.3].map(|f| predict(&head, &truth, "state", &moved(f), &mean).distribution);
         let states: Vec<_> = [0.8, 1.3]
             .into_iter()
             .zip(&distributions)
             .map(|(f, distribution)| KnownState { deformed: moved(f), distribution })
             .collect();
         let found = fit(&head, &StrainModel::default(), &states, &mean);
-        assert!((found.bias_per_compression + 0.7).abs() < 1e-3 && (found.bias_per_stretch - 0.2).abs() < 1e-3);
+        assert!(
+            (found.bias_per_compression + 0.7).abs() < 1e-3 && (found.bias_per_stretch - 0.2).abs() < 1e-3
+        );
         assert!((found.scale_per_area - 1.1).abs() < 1e-3, "{found:?}");
         assert_eq!(fit(&head, &truth, &[], &mean), truth);
     }

@@ -120,7 +120,9 @@ fn fitted(head: &Head, rig: &Rig, model: &StrainModel, mean: &Map) -> Outcome<St
     };
     let states: Vec<_> = expressions.iter().filter_map(known).collect();
     if states.is_empty() {
-        return Err(Failure::input("--fit: found no distribution with the name of an expression, expected one"));
+        return Err(Failure::input(
+            "--fit: found no distribution with the name of an expression, expected one",
+        ));
     }
     Ok(fit(head, model, &states, mean))
 }
