@@ -557,6 +557,11 @@ fn a_head_without_expression_maps_gets_predicted_ones() {
     let rig = imported.rig.expect("a rig");
     assert_eq!(rig["expressions"]["kiss"]["hemoglobin"]["kiss"], 1.0);
     assert!(rig["expressions"]["kiss"]["wrinkles"]["chin"].as_f64().is_some_and(|w| w > 0.4));
+    // Fitted to its own prediction, the model is what it was.
+    let fitted = done(&["predict", &out, "--fit"]);
+    let coefficient = fitted["model"]["bias_per_compression"].as_f64();
+    assert!(coefficient.is_some_and(|c| (c - 0.6).abs() < 0.02), "{coefficient:?}");
+    refused(&folder, &["predict", &file, "--fit"], &["--fit", "no distribution"]);
     // Without an output it only says how far prediction and maps agree.
     let report = done(&["predict", &out]);
     assert_eq!(report["expressions"][0]["name"], "kiss");
@@ -612,7 +617,8 @@ fn a_new_map_shows_in_the_picture() {
     let picture = |extra: &[&str]| {
         let frames = folder.path("frames");
         let common = ["render", "--head", &out, "--sequence", &sequence, "-o", &frames, "--size", "96x96"];
-        let output = rubor(&[&common[..], &["--no-export", "--no-video", "--antialias", "none"], extra].concat());
+        let plain = ["--no-export", "--no-video", "--antialias", "none"];
+        let output = rubor(&[&common[..], &plain, extra].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         image::open(Path::new(&frames).join("frame.0001.png")).expect("a frame").into_rgb8()
     };

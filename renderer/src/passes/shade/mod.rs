@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Theory: barycentrics and their screen derivatives from ray-plane volumes (exact under perspective); wrinkles as
-//! partial-derivative normals (papers/004 section 8.2); hemoglobin and skin colour (section 7.6); Kelemen and
+//! partial-derivative normals or as differences of normals (papers/004 sections 8.2 and 8.2.1); hemoglobin and skin colour (section 7.6); Kelemen and
 //! Szirmay-Kalos specular with the Beckmann distribution (papers/002, papers/004); percentage-closer soft shadows;
 //! order-2 spherical harmonics and a prefiltered map for the environment; multiple-bounce ambient occlusion.
 //!
