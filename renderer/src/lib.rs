@@ -20,11 +20,14 @@
 mod clusters;
 mod environment;
 mod error;
+pub mod footprint;
 mod frame;
 mod gpu;
 mod head;
+mod pass_timer;
 mod passes;
 mod scene;
+mod targets;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -34,11 +37,13 @@ mod texture;
 pub use environment::{Environment, EnvironmentMap};
 pub use error::RenderError;
 pub use frame::{FrameStats, Image, Renderer, Settings};
-pub use gpu::{AdapterDescription, Gpu, PassTimer, list_adapters};
+pub use gpu::{AdapterDescription, Gpu, list_adapters};
 pub use head::{
     ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
 };
+pub use pass_timer::{FrameTimes, PassTimer};
 pub use passes::antialias;
+pub use passes::appearance::{AppearanceMethods, ColorMethod, WrinkleMethod};
 pub use passes::scatter::ScatterMethod;
 pub use passes::scatter::surface::BARE_SKIN;
 pub use passes::shade::TransmitMethod;
