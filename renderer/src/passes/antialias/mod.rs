@@ -68,7 +68,8 @@ pub use settings::{
 };
 pub use tables::Tables;
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
 use wgpu::{BindingResource, TextureFormat, TextureUsages, TextureView};
 
 /// K of equation 10.6: how fast the previous frame fades with the difference of speeds.
