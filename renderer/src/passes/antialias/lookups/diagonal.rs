@@ -99,7 +99,7 @@ pub fn stair_area(before: usize, after: usize, offset: (f64, f64)) -> [f64; 2] {
     debug_assert_eq!(before % 2, after % 2);
     // The step goes from (0, 0) to (1, 0), y up. With u = x + y along the stair and v = y - x + 1/2 across, the middle
     // of every edge is at v = 0, and its ends are half a pixel to the sides.
-    let start_v = if before % 2 == 0 { 0.5 } else { -0.5 };
+    let start_v = if before.is_multiple_of(2) { 0.5 } else { -0.5 };
     let slope = -2.0 * start_v / (before + after + 1) as f64;
     let shift = offset.1 - offset.0;
     // How far a point is above the line, in v.
