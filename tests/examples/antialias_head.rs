@@ -1,7 +1,7 @@
 //! Antialiasing of the default head: error of every mode at rest, and of a head that turns and talks.
 //!
-//! Prints the tables of `docs/antialiasing.md`; with a folder on the command line, writes frames of the turning head
-//! into it. `RUBOR_FRAMES` (default 120) sets their number.
+//! Prints the tables of `docs/antialiasing.md`: `antialias_head [rest|motion|all] [FOLDER]`. With a folder, frames of
+//! the turning head are written into it. `RUBOR_FRAMES` (default 120) sets their number.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -143,8 +143,14 @@ impl Stage {
 fn main() -> Result<()> {
     let mut stage = Stage::new()?;
     println!("adapter: {}", stage.renderer.gpu().info.name);
-    at_rest(&mut stage)?;
-    in_motion(&mut stage, std::env::args().nth(1).map(PathBuf::from))
+    let part = std::env::args().nth(1).unwrap_or_else(|| "all".to_owned());
+    if part != "motion" {
+        at_rest(&mut stage)?;
+    }
+    if part != "rest" {
+        in_motion(&mut stage, std::env::args().nth(2).map(PathBuf::from))?;
+    }
+    Ok(())
 }
 
 fn at_rest(stage: &mut Stage) -> Result<()> {
