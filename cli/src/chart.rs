@@ -6,18 +6,18 @@
 //! ```
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use rubor_assets::compare::{Pixels, flip, mean_and_percentile, relative_rmse};
-use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, Settings, TransmitMethod, antialias};
+use rubor_renderer::antialias::Mode;
+use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, TransmitMethod};
 use rubor_rig::color::srgb_decode;
 use rubor_rig::evaluate::Evaluator;
-use rubor_rig::skin::profile::Profile;
 use serde::Serialize;
 
+use crate::antialias_method::Antialias;
 use crate::compare::difference_picture;
 use crate::failure::{Failure, Outcome};
-use crate::studio::Studio;
+use crate::studio::{self, Studio};
 use crate::{inputs, output};
 
 #[derive(clap::Args)]
@@ -91,16 +91,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let renderer = Renderer::new(Gpu::new(arguments.adapter.as_deref())?)?;
     let mut studio = Studio::new(renderer, &[&loaded.head])?;
     let mut draw = |scatter: ScatterMethod, transmit: TransmitMethod, frames: u32| -> Outcome<Drawn> {
-        let settings = Settings {
-            size: arguments.size,
-            scatter,
-            transmit,
-            profile: Arc::new(Profile::deon_six()),
-            antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
-            supersampling: 1,
-            shadow_size: 2048,
-            exposure: arguments.exposure,
-        };
+        let none = Antialias::Filter(Mode::None);
+        let settings = studio::settings(arguments.size, scatter, transmit, none, arguments.exposure);
         let (mut image, mut stats) = studio.render(&shots, 0.0, &settings)?;
         let mut times = Vec::new();
         for _ in 0..frames {
@@ -118,8 +110,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let is_skin: Vec<bool> = surface.diffuse.iter().map(|p| p[3] > 0.0).collect();
     if let Some(folder) = &arguments.output {
         output::folder(folder)?;
-        save(folder.join("reference-surface.png"), &surface.image)?;
-        save(folder.join("reference-screen.png"), &screen.image)?;
+        output::save_image(&folder.join("reference-surface.png"), &surface.image)?;
+        output::save_image(&folder.join("reference-screen.png"), &screen.image)?;
     }
     let mut rows = Vec::new();
     let references = [("reference-screen".to_owned(), Some(screen))];
@@ -139,7 +131,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         let (flip_mean, flip_99) = mean_and_percentile(&skin_map);
         if let Some(folder) = &arguments.output {
             let file = name.replace(':', "-");
-            save(folder.join(format!("{file}.png")), &drawn.image)?;
+            output::save_image(&folder.join(format!("{file}.png")), &drawn.image)?;
             let picture = difference_picture(&map, drawn.image.width, drawn.image.height);
             let path = folder.join(format!("{file}-difference.png"));
             output::commit(&path, |partial| picture.save(partial).map_err(std::io::Error::other))?;
@@ -182,12 +174,4 @@ fn pixels(image: &Image) -> Pixels {
         height: image.height as usize,
         linear: image.rgba.chunks_exact(4).map(decode).collect(),
     }
-}
-
-fn save(path: PathBuf, image: &Image) -> Outcome {
-    let picture = image::RgbImage::from_fn(image.width, image.height, |x, y| {
-        let i = 4 * (y as usize * image.width as usize + x as usize);
-        image::Rgb([image.rgba[i], image.rgba[i + 1], image.rgba[i + 2]])
-    });
-    output::commit(&path, |partial| picture.save(partial).map_err(std::io::Error::other))
 }

@@ -9,6 +9,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod adapters;
+mod antialias_method;
+mod bench;
 mod capture;
 mod chart;
 mod check;
@@ -20,6 +22,7 @@ mod failure;
 mod filter;
 mod gallery;
 mod import;
+mod inset;
 mod inputs;
 mod kernel;
 mod maps;
@@ -67,6 +70,8 @@ enum Command {
     Compare(compare::Arguments),
     /// Chart the cost and the error of scattering methods
     Chart(chart::Arguments),
+    /// Measure what each pass of a frame costs on the GPU
+    Bench(bench::Arguments),
     /// Print a diffusion profile: R(r), Gaussians, transmittance
     Profile(profile::Arguments),
     /// Print a separable kernel of a profile
@@ -86,10 +91,11 @@ fn main() -> ExitCode {
         Command::Export(a) => export::run(&a),
         Command::Check(a) => check::run(&a),
         Command::Maya(a) => maya::run(&a),
-        Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
+        Command::Maps(a) => maps::run(&a),
         Command::Filter(a) => filter::run(&a),
         Command::Compare(a) => compare::run(&a),
         Command::Chart(a) => chart::run(&a),
+        Command::Bench(a) => bench::run(&a),
         Command::Profile(a) => profile::run(&a),
         Command::Kernel(a) => kernel::run(&a),
         Command::Adapters(a) => adapters::run(&a),

@@ -27,6 +27,15 @@ pub(crate) fn commit(path: &Path, make: impl FnOnce(&Path) -> std::io::Result<()
     })
 }
 
+/// Writes a picture without its alpha, which is 1 everywhere.
+pub(crate) fn save_image(path: &Path, image: &rubor_renderer::Image) -> Outcome {
+    let picture = image::RgbImage::from_fn(image.width, image.height, |x, y| {
+        let i = 4 * (y as usize * image.width as usize + x as usize);
+        image::Rgb([image.rgba[i], image.rgba[i + 1], image.rgba[i + 2]])
+    });
+    commit(path, |partial| picture.save(partial).map_err(std::io::Error::other))
+}
+
 /// `frame.png` becomes `.partial-frame.png`: the extension stays, for programs that choose a format by it.
 fn partial_name(path: &Path) -> PathBuf {
     let mut name = OsString::from(".partial-");

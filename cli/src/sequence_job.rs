@@ -8,25 +8,26 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
-use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, Settings, TransmitMethod, antialias};
+use rubor_renderer::{
+    AppearanceMethods, ColorMethod, Gpu, Image, Renderer, ScatterMethod, TransmitMethod, WrinkleMethod,
+};
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
-use rubor_rig::skin::profile::Profile;
 use rubor_rig::timeline::Sequence;
 use serde_json::json;
 
+use crate::antialias_method::{Antialias, parse_antialias};
 use crate::failure::{Failure, Outcome};
 use crate::inputs::LoadedHead;
 use crate::progress::Progress;
-use crate::studio::Studio;
+use crate::studio::{self, Studio};
 use crate::video::Video;
-use crate::{contact_sheet, output, video};
+use crate::{contact_sheet, inset, output, video};
 
 /// What `render` and `demo` have in common.
 #[derive(Clone, clap::Args)]
@@ -48,6 +49,15 @@ pub(crate) struct Arguments {
     /// Light through thin parts: none or shadow-depth
     #[arg(long, default_value = "shadow-depth", value_name = "METHOD")]
     pub(crate) transmit: TransmitMethod,
+    /// Colour of the skin: hemoglobin (blood moves) or static
+    #[arg(long, default_value = "hemoglobin", value_name = "METHOD")]
+    pub(crate) color: ColorMethod,
+    /// Wrinkles: none, partial-derivative (slopes add) or difference (differences of normals add)
+    #[arg(long, default_value = "partial-derivative", value_name = "METHOD")]
+    pub(crate) wrinkles: WrinkleMethod,
+    /// Draw a map of the moment of the (first) head into a corner: hemoglobin (dark is more) or wrinkles
+    #[arg(long, value_enum, value_name = "MAP")]
+    pub(crate) inset: Option<inset::Map>,
     /// Antialiasing: none, mlaa, smaa-1x, smaa-s2x, smaa-t2x, smaa-4x, or ssaa:N with N x N samples a pixel
     #[arg(long, default_value = "smaa-s2x", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
@@ -74,13 +84,6 @@ pub(crate) struct Arguments {
     pub(crate) json: bool,
 }
 
-/// An antialiasing method by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Antialias {
-    Filter(antialias::Mode),
-    Supersampling(u32),
-}
-
 /// Numbers of frames from 1, ascending, each once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct FrameList(Vec<u32>);
@@ -98,19 +101,6 @@ fn parse_frames(text: &str) -> Result<FrameList, String> {
         numbers.extend(first..=last);
     }
     Ok(FrameList(numbers.into_iter().collect()))
-}
-
-fn parse_antialias(text: &str) -> Result<Antialias, String> {
-    if let Some(mode) = antialias::Mode::ALL.into_iter().find(|mode| mode.name() == text) {
-        return Ok(Antialias::Filter(mode));
-    }
-    match text.strip_prefix("ssaa:").and_then(|n| n.parse().ok()) {
-        Some(n) if (1..=8).contains(&n) => Ok(Antialias::Supersampling(n)),
-        _ => {
-            let names = antialias::Mode::ALL.map(antialias::Mode::name).join(", ");
-            Err(format!("found {text:?}, expected {names}, or ssaa:N with N from 1 to 8"))
-        }
-    }
 }
 
 /// What to draw.
@@ -136,7 +126,14 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         job.sequence.fps = fps;
     }
     let size = arguments.size.or(job.sequence.size).unwrap_or([640, 640]);
-    let settings = settings(size, arguments)?;
+    let mut settings = studio::settings(
+        size,
+        arguments.scatter,
+        arguments.transmit,
+        arguments.antialias,
+        arguments.exposure,
+    );
+    settings.appearance = AppearanceMethods { color: arguments.color, wrinkles: arguments.wrinkles };
     let mut evaluators = Vec::new();
     for loaded in &job.heads {
         let (evaluator, notes) = Evaluator::new(&loaded.head, &job.rig, &job.sequence)?;
@@ -155,6 +152,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     let spacing = heads.iter().map(|h| width(h)).fold(0.0, f32::max) * SPACING;
     let mut studio = Studio::new(renderer, &heads)?;
 
+    let mut inset = arguments.inset.map(|map| inset::Inset::new(map, heads[0])).transpose()?;
     let mut sheet = Vec::new();
     let on_sheet = contact_sheet::choose(frames.len() as u32);
     let mut times = PassTimes::default();
@@ -175,8 +173,12 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
                     studio.render(&shots_of(&evaluators, frame - 1), spacing, &settings)?;
                 }
                 drawn_last = Some(frame);
-                let (image, stats) = studio.render(&shots_of(&evaluators, frame), spacing, &settings)?;
-                let picture = opaque(image);
+                let shots = shots_of(&evaluators, frame);
+                let (image, stats) = studio.render(&shots, spacing, &settings)?;
+                let mut picture = opaque(image);
+                if let (Some(inset), Some(shot)) = (&mut inset, shots.first()) {
+                    inset.draw(&shot.face, settings.appearance, &mut picture);
+                }
                 write_png(&path, &picture)?;
                 first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
                 drawn.push(at.elapsed().as_secs_f64());
@@ -209,12 +211,15 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         "framesDrawn": drawn.len(),
         "scatter": arguments.scatter.to_string(),
         "transmit": arguments.transmit.to_string(),
-        "antialias": format!("{:?}", arguments.antialias),
+        "color": arguments.color.to_string(),
+        "wrinkles": arguments.wrinkles.to_string(),
+        "antialias": arguments.antialias.to_string(),
         "secondsToFirstFrame": first_frame_s,
         "secondsPerFrame": median(&mut drawn),
         "gpuMillisecondsPerPass": times.medians(),
         "triangles": times.triangles,
         "deviceMemoryBytes": times.memory_bytes,
+        "mapTextures": heads.first().map(|h| rubor_renderer::footprint::of_maps(&h.maps)),
     });
     let text = serde_json::to_string_pretty(&stats).map_err(Failure::job)?;
     output::write(&arguments.output.join(STATS_FILE), text.as_bytes())?;
@@ -237,23 +242,6 @@ fn chosen_frames(count: u32, list: Option<&FrameList>) -> Outcome<Vec<u32>> {
     }
 }
 
-fn settings(size: [u32; 2], arguments: &Arguments) -> Outcome<Settings> {
-    let (mode, supersampling) = match arguments.antialias {
-        Antialias::Filter(mode) => (mode, 1),
-        Antialias::Supersampling(n) => (antialias::Mode::None, n),
-    };
-    Ok(Settings {
-        size,
-        scatter: arguments.scatter,
-        transmit: arguments.transmit,
-        profile: Arc::new(Profile::deon_six()),
-        antialias: antialias::Settings::new(mode, antialias::Preset::High),
-        supersampling,
-        shadow_size: 2048,
-        exposure: arguments.exposure,
-    })
-}
-
 /// Writes down what job the folder holds. False where a stopped run of the same job goes on.
 fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<bool> {
     let content = json!({
@@ -263,7 +251,10 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
         "size": size,
         "scatter": arguments.scatter.to_string(),
         "transmit": arguments.transmit.to_string(),
-        "antialias": format!("{:?}", arguments.antialias),
+        "color": arguments.color.to_string(),
+        "wrinkles": arguments.wrinkles.to_string(),
+        "inset": arguments.inset.map(|i| format!("{i:?}")),
+        "antialias": arguments.antialias.to_string(),
         "exposure": arguments.exposure,
         "program": env!("CARGO_PKG_VERSION"),
     });
@@ -371,9 +362,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn methods_are_read_by_name() {
-        assert_eq!(parse_antialias("ssaa:4"), Ok(Antialias::Supersampling(4)));
-        assert!(parse_antialias("ssaa:0").is_err());
+    fn frame_lists_are_read() {
         assert_eq!(parse_frames("3, 1-2,2"), Ok(FrameList(vec![1, 2, 3])));
         for wrong in ["", "0", "4-3", "a", "1,,2"] {
             assert!(parse_frames(wrong).unwrap_err().contains(wrong));

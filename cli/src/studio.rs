@@ -1,16 +1,19 @@
 //! From a shot of the rig to a scene of the renderer.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::{Mat4, Vec3};
 use rubor_renderer::{
-    Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind, Renderer,
-    Scene, Settings,
+    AppearanceMethods,     Camera, ColorTable, Environment, EnvironmentMap, FrameTimes, HeadInstance, HeadOnGpu, Light, LightKind,
+    Renderer, ScatterMethod, Scene, Settings, TransmitMethod, antialias,
 };
 use rubor_rig::evaluate::{EnvironmentState, LightState, Shot};
 use rubor_rig::head::Head;
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
+use rubor_rig::skin::profile::Profile;
 
+use crate::antialias_method::Antialias;
 use crate::failure::{Failure, Outcome};
 
 /// Radiance behind the heads: a grey that a face is neither lost nor dazzled before.
@@ -21,6 +24,31 @@ const COLOR_TABLE_SIDE: u32 = 64;
 const LAMP_RADIUS_METRES: f32 = 0.12;
 /// Tangent of the angular radius of a directional light.
 const DISTANT_LAMP_RADIUS: f32 = 0.05;
+
+/// Texels on a side of a shadow map.
+const SHADOW_SIZE: u32 = 2048;
+
+/// How frames are made with these methods; skin is that of the measured six Gaussians.
+pub(crate) fn settings(
+    size: [u32; 2],
+    scatter: ScatterMethod,
+    transmit: TransmitMethod,
+    antialias: Antialias,
+    exposure: f32,
+) -> Settings {
+    let (mode, supersampling) = antialias.parts();
+    Settings {
+        size,
+        scatter,
+        transmit,
+        appearance: AppearanceMethods::default(),
+        profile: Arc::new(Profile::deon_six()),
+        antialias: antialias::Settings::new(mode, antialias::Preset::High),
+        supersampling,
+        shadow_size: SHADOW_SIZE,
+        exposure,
+    }
+}
 
 /// A renderer with the heads and environments that shots name.
 pub(crate) struct Studio {
@@ -47,6 +75,27 @@ impl Studio {
         spacing: f32,
         settings: &Settings,
     ) -> Outcome<(rubor_renderer::Image, rubor_renderer::FrameStats)> {
+        self.with_scene(shots, spacing, |renderer, scene| Ok(renderer.render(scene, settings)?))
+    }
+
+    /// Draws a shot of one head again and again; see [`Renderer::measure`].
+    pub(crate) fn measure(
+        &mut self,
+        shot: &Shot,
+        settings: &Settings,
+        warm_up: u32,
+        frames: u32,
+    ) -> Outcome<Vec<FrameTimes>> {
+        let shots = std::slice::from_ref(shot);
+        self.with_scene(shots, 0.0, |renderer, scene| Ok(renderer.measure(scene, settings, warm_up, frames)?))
+    }
+
+    fn with_scene<T>(
+        &mut self,
+        shots: &[Shot],
+        spacing: f32,
+        draw: impl FnOnce(&mut Renderer, &Scene<'_>) -> Outcome<T>,
+    ) -> Outcome<T> {
         let Some(first) = shots.first() else { return Err(Failure::job("there is no head to draw")) };
         if let Some(environment) = &first.environment {
             self.load_environment(environment)?;
@@ -78,7 +127,7 @@ impl Studio {
             environment_intensity: first.environment.as_ref().map_or(0.0, |e| e.intensity),
             background_linear: BACKDROP_LINEAR,
         };
-        Ok(self.renderer.render(&scene, settings)?)
+        draw(&mut self.renderer, &scene)
     }
 
     fn load_environment(&mut self, state: &EnvironmentState) -> Outcome {

@@ -7,10 +7,11 @@ use rubor_rig::skin::profile::Profile;
 use serde::Serialize;
 
 use crate::error::RenderError;
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::{GpuVertex, HeadOnGpu};
+use crate::pass_timer::{FrameLog, FrameTimes, PassTimer};
 use crate::passes::antialias::{self, Antialias, History};
-use crate::passes::appearance::{Appearance, Blended};
+use crate::passes::appearance::{Appearance, AppearanceMethods, Blended, ColorMethod};
 use crate::passes::compose::Compose;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
@@ -23,6 +24,7 @@ use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
 use crate::passes::velocity::{Moving, Velocity};
 use crate::passes::visibility::Visibility;
 use crate::scene::{Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
+use crate::targets::Targets;
 
 /// How frames are made.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +35,8 @@ pub struct Settings {
     pub scatter: ScatterMethod,
     /// How light passes through thin parts.
     pub transmit: TransmitMethod,
+    /// How colour and wrinkles of the moment are drawn.
+    pub appearance: AppearanceMethods,
     /// How far light goes in skin, for every method.
     pub profile: Arc<Profile>,
     /// Antialiasing of the displayed image.
@@ -69,6 +73,9 @@ pub struct FrameStats {
     pub scatter_noise: Option<f64>,
 }
 
+/// Frames that [`Renderer::measure`] hands to the device before it waits: enough to keep it busy.
+const FRAMES_IN_FLIGHT: usize = 3;
+
 /// The view as view.wgsl reads it.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -86,7 +93,8 @@ pub(crate) struct View {
     pub(crate) near: f32,
     pub(crate) light_count: u32,
     pub(crate) shading_jitter: [f32; 2],
-    pub(crate) padding: [f32; 2],
+    pub(crate) depth_origin_mm: f32,
+    pub(crate) padding: f32,
 }
 
 /// Draws scenes. Keeps pipelines, and images of the last size, between frames; nothing else carries over.
@@ -122,29 +130,6 @@ struct Past {
     frames: u64,
 }
 
-/// Images between passes.
-struct Targets {
-    size: [u32; 2],
-    samples: Vec<SampleTargets>,
-    velocity: Option<wgpu::TextureView>,
-    image: wgpu::Texture,
-    irradiance: wgpu::TextureView,
-    albedo: wgpu::TextureView,
-    direct: wgpu::TextureView,
-    scratch: wgpu::TextureView,
-    scattered: wgpu::TextureView,
-    hdr: wgpu::TextureView,
-    shadows: wgpu::Texture,
-}
-
-/// Images of one sample of each pixel.
-struct SampleTargets {
-    ids: wgpu::TextureView,
-    depth: wgpu::TextureView,
-    /// Encoded for display, before antialiasing.
-    displayed: wgpu::TextureView,
-}
-
 /// Buffers of one head of a scene.
 struct Instance {
     positions: wgpu::Buffer,
@@ -153,85 +138,9 @@ struct Instance {
     blended: Blended,
 }
 
-impl Targets {
-    fn new(gpu: &Gpu, settings: &Settings, shadow_layers: u32) -> Self {
-        use wgpu::TextureFormat::{Depth32Float, R32Uint, Rgba8Unorm, Rgba16Float};
-        use wgpu::TextureUsages as Use;
-        let size = settings.frame_size();
-        let storage = Use::STORAGE_BINDING;
-        let view = |label, size, format, usage| {
-            gpu.target(label, size, format, usage | Use::TEXTURE_BINDING | Use::COPY_SRC)
-                .create_view(&Default::default())
-        };
-        let light = |label| view(label, size, Rgba16Float, storage);
-        let mode = settings.antialias.mode;
-        let samples = mode
-            .subsamples(0)
-            .iter()
-            .map(|_| SampleTargets {
-                ids: view("ids", size, R32Uint, Use::RENDER_ATTACHMENT),
-                depth: view("depth", size, Depth32Float, Use::RENDER_ATTACHMENT),
-                displayed: view("displayed", settings.size, Rgba8Unorm, storage),
-            })
-            .collect();
-        let shadows = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("shadows"),
-            size: wgpu::Extent3d {
-                width: settings.shadow_size,
-                height: settings.shadow_size,
-                depth_or_array_layers: shadow_layers.max(1),
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: Depth32Float,
-            usage: Use::RENDER_ATTACHMENT | Use::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        Self {
-            size,
-            samples,
-            velocity: mode.is_temporal().then(|| light("velocity")),
-            image: gpu.target(
-                "image",
-                settings.size,
-                Rgba8Unorm,
-                storage | Use::COPY_SRC | Use::TEXTURE_BINDING,
-            ),
-            irradiance: light("irradiance"),
-            albedo: light("albedo"),
-            direct: light("direct"),
-            scratch: light("scratch"),
-            scattered: light("scattered"),
-            hdr: view("hdr", size, Rgba16Float, storage | Use::RENDER_ATTACHMENT),
-            shadows,
-        }
-    }
-
-    fn matches(&self, settings: &Settings, shadow_layers: u32) -> bool {
-        let mode = settings.antialias.mode;
-        self.size == settings.frame_size()
-            && [self.image.width(), self.image.height()] == settings.size
-            && self.samples.len() == mode.subsamples(0).len()
-            && self.velocity.is_some() == mode.is_temporal()
-            && self.shadows.width() == settings.shadow_size
-            && self.shadows.depth_or_array_layers() >= shadow_layers
-    }
-
-    fn bytes(&self) -> u64 {
-        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
-        let image = u64::from(self.image.width()) * u64::from(self.image.height()) * 4;
-        let samples = self.samples.len() as u64;
-        let s = self.shadows.size();
-        let shadow = u64::from(s.width) * u64::from(s.height) * u64::from(s.depth_or_array_layers) * 4;
-        let lights = 6 + u64::from(self.velocity.is_some());
-        pixels * (samples * 8 + lights * 8) + image * (1 + samples) + shadow
-    }
-}
-
 impl Settings {
     /// Pixels that the passes before display draw.
-    fn frame_size(&self) -> [u32; 2] {
+    pub(crate) fn frame_size(&self) -> [u32; 2] {
         self.size.map(|n| n * self.supersampling)
     }
 }
@@ -287,6 +196,73 @@ impl Renderer {
         scene: &Scene<'_>,
         settings: &Settings,
     ) -> Result<(Image, FrameStats), RenderError> {
+        self.prepare(scene, settings)?;
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let scatter_noise = self.record_frame(&mut encoder, scene, settings)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
+        let image =
+            if self.antialias.is_some() { &targets.image } else { targets.samples[0].displayed.texture() };
+        let rgba = self.gpu.read_texture(image)?;
+        let stats = FrameStats {
+            passes_ms: self.timer.read(&self.gpu)?,
+            scatter_noise,
+            triangles: scene
+                .heads
+                .iter()
+                .map(|h| u64::from(h.head.opaque_triangles + h.head.overlay_triangles))
+                .sum(),
+            memory_bytes: self.memory_bytes(scene),
+        };
+        Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
+    }
+
+    /// Draws a scene `frames` times, one frame right after the other and without reading any picture, and says what each
+    /// cost; the first `warm_up` of them are left out. Empty where the adapter has no timestamps.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`]; `reference-surface`, which is not drawn in one go.
+    pub fn measure(
+        &mut self,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        warm_up: u32,
+        frames: u32,
+    ) -> Result<Vec<FrameTimes>, RenderError> {
+        if let ScatterMethod::ReferenceSurface(_) = settings.scatter {
+            return Err(RenderError::Limit {
+                what: "method to measure",
+                found: settings.scatter.to_string(),
+                expected: "one that draws a frame in one go".into(),
+            });
+        }
+        self.prepare(scene, settings)?;
+        let mut log = FrameLog::new(&self.gpu, frames);
+        let mut submissions = std::collections::VecDeque::new();
+        for frame in 0..warm_up + frames {
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            self.record_frame(&mut encoder, scene, settings)?;
+            if frame >= warm_up {
+                self.timer.append(&mut encoder, &mut log);
+            }
+            submissions.push_back(self.gpu.queue.submit([encoder.finish()]));
+            if submissions.len() > FRAMES_IN_FLIGHT {
+                self.gpu.wait(submissions.pop_front())?;
+            }
+        }
+        log.read(&self.gpu)
+    }
+
+    /// Bytes of heads, buffers and images of the last frame.
+    fn memory_bytes(&self, scene: &Scene<'_>) -> u64 {
+        self.targets.as_ref().map_or(0, Targets::bytes)
+            + self.antialias.as_ref().map_or(0, Antialias::memory_bytes)
+            + self.past.history.as_ref().map_or(0, History::memory_bytes)
+            + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()
+    }
+
+    /// Checks a scene and makes what its frames need.
+    fn prepare(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
         self.check(scene, settings)?;
         let shadow_layers = scene.lights.iter().filter(|l| l.casts_shadow).count() as u32;
         if !self.targets.as_ref().is_some_and(|t| t.matches(settings, shadow_layers)) {
@@ -312,24 +288,7 @@ impl Renderer {
             self.shade.prepare_samples(&self.gpu);
         }
         self.is_scattered = settings.scatter != ScatterMethod::None;
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let scatter_noise = self.record_frame(&mut encoder, scene, settings)?;
-        self.gpu.queue.submit([encoder.finish()]);
-        let Some(targets) = &self.targets else { return Err(RenderError::Lost("no images".into())) };
-        let image =
-            if self.antialias.is_some() { &targets.image } else { targets.samples[0].displayed.texture() };
-        let rgba = self.gpu.read_texture(image)?;
-        let heads = scene.heads.iter().map(|h| h.head);
-        let stats = FrameStats {
-            passes_ms: self.timer.read(&self.gpu)?,
-            scatter_noise,
-            triangles: heads.clone().map(|h| u64::from(h.opaque_triangles + h.overlay_triangles)).sum(),
-            memory_bytes: targets.bytes()
-                + self.antialias.as_ref().map_or(0, Antialias::memory_bytes)
-                + self.past.history.as_ref().map_or(0, History::memory_bytes)
-                + heads.map(|h| h.memory_bytes).sum::<u64>(),
-        };
-        Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
+        Ok(())
     }
 
     /// Deformed points of the first head of the last frame, world space, metres.
@@ -366,6 +325,18 @@ impl Renderer {
         Ok(frames.into_iter().map(frame).collect())
     }
 
+    /// Linear Rec. 709 albedo of the skin of the last frame (of its last sample), 0 elsewhere; a = 1 on skin. Rows from
+    /// the top.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_albedo(&self) -> Result<Vec<[f32; 4]>, RenderError> {
+        let Some(targets) = &self.targets else { return Ok(Vec::new()) };
+        let bytes = self.gpu.read_texture(targets.albedo.texture())?;
+        let halves: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
+    }
+
     /// Diffuse light of the last frame before albedo: linear radiance of a white surface, a = scattering strength.
     /// Rows from the top; with supersampling, the frame's own pixels.
     ///
@@ -374,9 +345,13 @@ impl Renderer {
     pub fn read_diffuse(&self) -> Result<Vec<[f32; 4]>, RenderError> {
         let Some(targets) = &self.targets else { return Ok(Vec::new()) };
         let image = if self.is_scattered { &targets.scattered } else { &targets.irradiance };
-        let halves: Vec<[half::f16; 4]> =
-            bytemuck::pod_collect_to_vec(&self.gpu.read_texture(image.texture())?);
-        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
+        let read = |image: &wgpu::TextureView| -> Result<Vec<[half::f16; 4]>, RenderError> {
+            Ok(bytemuck::pod_collect_to_vec(&self.gpu.read_texture(image.texture())?))
+        };
+        let (light, strength) = (read(image)?, read(&targets.albedo)?);
+        let pixel =
+            |([r, g, b, _], [.., a]): ([half::f16; 4], [half::f16; 4])| [r, g, b, a].map(half::f16::to_f32);
+        Ok(light.into_iter().zip(strength).map(pixel).collect())
     }
 
     fn check(&self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
@@ -444,7 +419,10 @@ impl Renderer {
         for (i, head) in scene.heads.iter().enumerate() {
             let points = u64::from(head.head.point_count) * 16;
             let frames = u64::from(head.head.vertex_count) * FRAME_BYTES;
-            let fits = |n: &Instance| n.positions.size() == points && n.frames.size() == frames;
+            let wrinkle_maps = head.head.maps.as_ref().map_or(0, |m| m.wrinkle_maps);
+            let fits = |n: &Instance| {
+                n.positions.size() == points && n.frames.size() == frames && n.blended.fits(wrinkle_maps)
+            };
             if self.instances.get(i).is_some_and(fits) {
                 continue;
             }
@@ -452,7 +430,7 @@ impl Renderer {
                 positions: gpu.storage_zeroed("positions", points),
                 previous_positions: gpu.storage_zeroed("previous positions", points),
                 frames: gpu.storage_zeroed("surface frames", frames),
-                blended: Blended::new(gpu),
+                blended: Blended::new(gpu, wrinkle_maps),
             };
             self.instances.truncate(i);
             self.instances.push(instance);
@@ -487,7 +465,11 @@ impl Renderer {
             self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
             if let Some(maps) = &head.maps {
                 let state = instance.state;
-                let (distributions, zones) = (&state.distributions, &state.zones);
+                let distributions: &[f32] = match settings.appearance.color {
+                    ColorMethod::Static => &[],
+                    ColorMethod::Hemoglobin => &state.distributions,
+                };
+                let zones = &state.zones;
                 self.appearance.record(gpu, encoder, timer, maps, distributions, zones, &buffers.blended);
             }
         }
@@ -524,12 +506,13 @@ impl Renderer {
             };
             let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
             for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
-                let shaded = shaded(index, instance, head, buffers);
+                let shaded = shaded(index, instance, head, buffers, settings.appearance);
                 self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
             }
 
             let images = Images {
                 irradiance: &targets.irradiance,
+                albedo: &targets.albedo,
                 depth: &sample.depth,
                 scratch: &targets.scratch,
                 scattered: &targets.scattered,
@@ -541,13 +524,15 @@ impl Renderer {
                         view: &view,
                         ids: &sample.ids,
                         irradiance: &targets.irradiance,
+                        albedo: &targets.albedo,
                         depth: &sample.depth,
                         scattered: &targets.scattered,
                     };
                     // The sums need the light of this frame: the device works on it while samples are drawn.
                     let fresh = gpu.device.create_command_encoder(&Default::default());
                     gpu.queue.submit([std::mem::replace(encoder, fresh).finish()]);
-                    integrate(gpu, &self.shade, scene, &heads, &lighting, &integral, &inputs, batches)?;
+                    let appearance = settings.appearance;
+                    integrate(gpu, &self.shade, scene, &heads, &lighting, &integral, &inputs, appearance, batches)?;
                     integral.record_finish(gpu, encoder, timer, &inputs);
                     scatter_noise = integral.relative_noise(gpu)?;
                     &targets.scattered
@@ -647,8 +632,19 @@ fn view(
         near: NEAR_METRES,
         light_count: scene.lights.len() as u32,
         shading_jitter,
-        padding: [0.0; 2],
+        depth_origin_mm: 1000.0 * nearest_head(scene, &view_from_world),
+        padding: 0.0,
     }
+}
+
+/// View depth of the nearest head, between its middle and its front, metres: depths near it are kept best.
+fn nearest_head(scene: &Scene<'_>, view_from_world: &Mat4) -> f32 {
+    let depth = |instance: &crate::scene::HeadInstance<'_>| {
+        let (low, high) = instance.head.bounds;
+        let middle = world_from_head(instance).transform_point3(0.5 * (low + high));
+        -view_from_world.transform_point3(middle).z - 0.25 * (high - low).min_element()
+    };
+    scene.heads.iter().map(depth).filter(|d| *d > 0.0).reduce(f32::min).unwrap_or(0.0)
 }
 
 /// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
@@ -663,6 +659,7 @@ fn integrate(
     lighting: &Lighting<'_>,
     integral: &Surface,
     inputs: &surface::Inputs<'_>,
+    appearance: AppearanceMethods,
     batches: u32,
 ) -> Result<(), RenderError> {
     let size = inputs.scattered.texture().size();
@@ -676,7 +673,7 @@ fn integrate(
         let point_of_vertex: Vec<u32> = vertices.iter().map(|v| v.point).collect();
         let opaque = &triangles[..head.opaque_triangles as usize];
         let skin = Skin::new(opaque, &point_of_vertex, &points, &clip_from_world, PICTURE_MARGIN);
-        let shaded = shaded(index, instance, head, buffers);
+        let shaded = shaded(index, instance, head, buffers, appearance);
         integral.add_head(gpu, inputs, index as u32, &skin, batches, &mut |encoder, samples, light| {
             let count = surface::BATCH as u32;
             shade.record_samples(gpu, encoder, lighting, &shaded, [samples, light], count);
@@ -690,6 +687,7 @@ fn shaded<'a>(
     instance: &crate::scene::HeadInstance<'_>,
     head: &'a HeadOnGpu,
     buffers: &'a Instance,
+    appearance: AppearanceMethods,
 ) -> Shaded<'a> {
     Shaded {
         index: index as u32,
@@ -697,7 +695,11 @@ fn shaded<'a>(
         positions: &buffers.positions,
         frames: &buffers.frames,
         blended: &buffers.blended,
-        hemoglobin_scale: instance.state.hemoglobin_scale,
+        hemoglobin_scale: match appearance.color {
+            ColorMethod::Static => 1.0,
+            ColorMethod::Hemoglobin => instance.state.hemoglobin_scale,
+        },
+        wrinkles: appearance.wrinkles,
     }
 }
 

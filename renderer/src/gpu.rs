@@ -74,6 +74,10 @@ pub fn list_adapters() -> Vec<AdapterDescription> {
     adapters().iter().enumerate().map(|(i, a)| describe(i, a)).collect()
 }
 
+/// Features that are used where the adapter has them; nothing needs them.
+const WELCOME_FEATURES: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::PRIMITIVE_INDEX);
+
 impl Gpu {
     /// Opens the best adapter, or the one whose index or part of whose name (any letter case) is `wanted`.
     ///
@@ -113,11 +117,7 @@ impl Gpu {
         };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("rubor"),
-            required_features: if has_timestamps {
-                wgpu::Features::TIMESTAMP_QUERY
-            } else {
-                wgpu::Features::empty()
-            },
+            required_features: adapter.features() & WELCOME_FEATURES,
             required_limits,
             ..Default::default()
         };
@@ -142,6 +142,16 @@ impl Gpu {
             Some(message) => Err(RenderError::Lost(message)),
             None => Ok(()),
         }
+    }
+
+    /// Waits until the device has done a submission, or all of them.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub(crate) fn wait(&self, submission: Option<wgpu::SubmissionIndex>) -> Result<(), RenderError> {
+        let wait = wgpu::PollType::Wait { submission_index: submission, timeout: None };
+        self.device.poll(wait).map_err(|e| RenderError::Lost(e.to_string()))?;
+        self.check()
     }
 
     /// A compute pipeline whose bindings are those that the shader declares.
@@ -317,118 +327,9 @@ impl Gpu {
 
     fn read_mapped(&self, staging: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
         staging.map_async(wgpu::MapMode::Read, .., |_| {});
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| RenderError::Lost(e.to_string()))?;
-        self.check()?;
+        self.wait(None)?;
         let bytes = staging.get_mapped_range(..).map_err(|e| RenderError::Lost(e.to_string()))?.to_vec();
         staging.unmap();
         Ok(bytes)
-    }
-}
-
-/// GPU time of each pass of one frame.
-pub struct PassTimer {
-    queries: Option<(wgpu::QuerySet, wgpu::Buffer)>,
-    names: Vec<&'static str>,
-}
-
-/// Passes that one frame can time.
-const TIMED_PASSES: u32 = 64;
-
-impl PassTimer {
-    /// A timer; it measures nothing on a device without timestamps.
-    pub fn new(gpu: &Gpu) -> Self {
-        let queries = gpu.has_timestamps.then(|| {
-            let set = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("pass times"),
-                ty: wgpu::QueryType::Timestamp,
-                count: TIMED_PASSES * 2,
-            });
-            let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("pass times"),
-                size: u64::from(TIMED_PASSES) * 16,
-                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            });
-            (set, resolved)
-        });
-        Self { queries, names: Vec::new() }
-    }
-
-    /// Forgets the last frame.
-    pub fn restart(&mut self) {
-        self.names.clear();
-    }
-
-    fn next(&mut self, name: &'static str) -> Option<(&wgpu::QuerySet, u32)> {
-        let (set, _) = self.queries.as_ref()?;
-        let i = self.names.len() as u32;
-        if i >= TIMED_PASSES {
-            return None;
-        }
-        self.names.push(name);
-        Some((set, i * 2))
-    }
-
-    /// Begins a timed compute pass.
-    pub fn compute<'e>(
-        &mut self,
-        encoder: &'e mut wgpu::CommandEncoder,
-        name: &'static str,
-    ) -> wgpu::ComputePass<'e> {
-        let timestamp_writes = self.next(name).map(|(query_set, i)| wgpu::ComputePassTimestampWrites {
-            query_set,
-            beginning_of_pass_write_index: Some(i),
-            end_of_pass_write_index: Some(i + 1),
-        });
-        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes })
-    }
-
-    /// Begins a timed render pass.
-    pub fn render<'e>(
-        &mut self,
-        encoder: &'e mut wgpu::CommandEncoder,
-        name: &'static str,
-        color: &[Option<wgpu::RenderPassColorAttachment<'_>>],
-        depth: Option<wgpu::RenderPassDepthStencilAttachment<'_>>,
-    ) -> wgpu::RenderPass<'e> {
-        let timestamp_writes = self.next(name).map(|(query_set, i)| wgpu::RenderPassTimestampWrites {
-            query_set,
-            beginning_of_pass_write_index: Some(i),
-            end_of_pass_write_index: Some(i + 1),
-        });
-        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some(name),
-            color_attachments: color,
-            depth_stencil_attachment: depth,
-            timestamp_writes,
-            ..Default::default()
-        })
-    }
-
-    /// Writes the times where [`PassTimer::read`] finds them; the last thing in a frame's encoder.
-    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
-        if let Some((set, resolved)) = &self.queries
-            && !self.names.is_empty()
-        {
-            encoder.resolve_query_set(set, 0..self.names.len() as u32 * 2, resolved, 0);
-        }
-    }
-
-    /// Milliseconds of each pass of the last submitted frame, in order; empty without timestamps.
-    ///
-    /// # Errors
-    /// The device failed.
-    pub fn read(&self, gpu: &Gpu) -> Result<Vec<(&'static str, f64)>, RenderError> {
-        let Some((_, resolved)) = &self.queries else { return Ok(Vec::new()) };
-        let bytes = gpu.read_buffer(resolved)?;
-        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes);
-        let ms = |i: usize| {
-            ticks[2 * i + 1].saturating_sub(ticks[2 * i]) as f64
-                * f64::from(gpu.queue.get_timestamp_period())
-                * 1e-6
-        };
-        Ok(self.names.iter().enumerate().map(|(i, name)| (*name, ms(i))).collect())
     }
 }

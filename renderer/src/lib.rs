@@ -19,11 +19,14 @@
 
 mod environment;
 mod error;
+pub mod footprint;
 mod frame;
 mod gpu;
 mod head;
+mod pass_timer;
 mod passes;
 mod scene;
+mod targets;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -33,11 +36,13 @@ mod texture;
 pub use environment::{Environment, EnvironmentMap};
 pub use error::RenderError;
 pub use frame::{FrameStats, Image, Renderer, Settings};
-pub use gpu::{AdapterDescription, Gpu, PassTimer, list_adapters};
+pub use gpu::{AdapterDescription, Gpu, list_adapters};
 pub use head::{
     ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
 };
+pub use pass_timer::{FrameTimes, PassTimer};
 pub use passes::antialias;
+pub use passes::appearance::{AppearanceMethods, ColorMethod, WrinkleMethod};
 pub use passes::scatter::ScatterMethod;
 pub use passes::shade::TransmitMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

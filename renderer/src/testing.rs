@@ -38,10 +38,13 @@ pub(crate) fn assert_layout(wgsl: &str, structure: &str, size: usize, fields: &[
     assert_eq!(members, fields, "fields of {structure}");
 }
 
+/// What shaders of the project may use; only one, beside another without, uses numbers of triangles.
+const CAPABILITIES: naga::valid::Capabilities = naga::valid::Capabilities::PRIMITIVE_INDEX;
+
 /// Parses and validates a shader and returns the workgroup size of each of its compute entry points.
 pub(crate) fn validated_workgroups(wgsl: &str) -> Vec<(String, [u32; 3])> {
     let module = naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|e| panic!("{}", e.emit_to_string(wgsl)));
-    naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default())
+    naga::valid::Validator::new(naga::valid::ValidationFlags::all(), CAPABILITIES)
         .validate(&module)
         .unwrap_or_else(|e| panic!("{}", e.emit_to_string(wgsl)));
     let compute = |e: &&naga::EntryPoint| e.stage == naga::ShaderStage::Compute;

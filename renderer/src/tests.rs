@@ -17,7 +17,7 @@ use crate::passes::{
 };
 use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
 use crate::{
-    Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
+    AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
     Renderer, ScatterMethod, Scene, Settings, TransmitMethod,
 };
 
@@ -32,7 +32,8 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     assert_eq!(validated_workgroups(compose::SHADER), square("compose"));
     assert_eq!(validated_workgroups(display::SHADER), square("display"));
     assert_eq!(validated_workgroups(velocity::SHADER), square("velocity_main"));
-    for raster in [shadow::SHADER, visibility::SHADER, overlay::SHADER] {
+    let visibility = [true, false].map(visibility::shader);
+    for raster in [shadow::SHADER, &visibility[0], &visibility[1], overlay::SHADER] {
         assert_eq!(validated_workgroups(raster), []);
     }
 }
@@ -40,17 +41,17 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
 #[test]
 fn structs_are_laid_out_alike_on_both_sides() {
     assert_layout(
-        visibility::SHADER,
+        &visibility::shader(false),
         "View",
         size_of::<View>(),
         &offsets!(View; clip_from_world as "clip_from_world",
             previous_clip_from_world as "previous_clip_from_world", origin as "origin", right as "right",
             up as "up", forward as "forward", size as "size", head_count as "head_count",
             has_environment as "has_environment", jitter as "jitter", near as "near",
-            light_count as "light_count", shading_jitter as "shading_jitter"),
+            light_count as "light_count", shading_jitter as "shading_jitter", depth_origin_mm as "depth_origin_mm"),
     );
     assert_layout(
-        visibility::SHADER,
+        &visibility::shader(false),
         "Vertex",
         size_of::<GpuVertex>(),
         &offsets!(GpuVertex; point as "point", u as "u", v as "v"),
@@ -66,7 +67,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
         "Params",
         size_of::<appearance::Params>(),
         &offsets!(appearance::Params; distribution_count as "distribution_count", zone_count as "zone_count",
-            distribution_weights as "distribution_weights", zone_weights as "zone_weights",
+            wrinkle_layers as "wrinkle_layers", distribution_weights as "distribution_weights", zone_weights as "zone_weights",
             zone_maps as "zone_maps"),
     );
     assert_layout(
@@ -84,7 +85,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             hemoglobin_scale as "hemoglobin_scale", head as "head",
             environment_intensity as "environment_intensity", environment_levels as "environment_levels",
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", transmit as "transmit", hair_color as "hair_color",
-            is_second_sample as "is_second_sample", harmonics as "harmonics", lights as "lights"),
+            is_second_sample as "is_second_sample", adds_differences as "adds_differences", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
         overlay::SHADER,
@@ -101,7 +102,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
 }
 
 /// A dome of skin 16 cm across that faces +Z, with a texture seam along x = 0, two shapes and maps of every kind.
-fn dome() -> Head {
+pub(crate) fn dome() -> Head {
     const N: usize = 24;
     let at = |i: usize| i as f32 / (N - 1) as f32 * 2.0 - 1.0;
     let mut mesh = Mesh::default();
@@ -155,19 +156,21 @@ fn dome() -> Head {
     Head { name: "dome".into(), mesh, shapes, maps, ..Head::default() }
 }
 
-const WHITE_TABLE: ColorTable<'static> = ColorTable { width: 2, height: 2, texels: &[[0.8; 3]; 4] };
+pub(crate) const WHITE_TABLE: ColorTable<'static> =
+    ColorTable { width: 2, height: 2, texels: &[[0.8; 3]; 4] };
 
-fn renderer() -> Option<Renderer> {
+pub(crate) fn renderer() -> Option<Renderer> {
     gpu()?;
     let gpu = Gpu::new(std::env::var("RUBOR_ADAPTER").ok().as_deref()).ok()?;
     Some(Renderer::new(gpu).expect("the passes compile"))
 }
 
-fn settings(size: [u32; 2]) -> Settings {
+pub(crate) fn settings(size: [u32; 2]) -> Settings {
     Settings {
         size,
         scatter: ScatterMethod::Separable(17),
         transmit: TransmitMethod::ShadowDepth,
+        appearance: AppearanceMethods::default(),
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
         supersampling: 1,
@@ -179,7 +182,7 @@ fn settings(size: [u32; 2]) -> Settings {
 const CAMERA: Camera =
     Camera { position: Vec3::new(0.0, 0.0, 0.5), target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 25.0 };
 
-fn lamp() -> Light {
+pub(crate) fn lamp() -> Light {
     Light {
         kind: LightKind::Spot {
             position: Vec3::new(0.4, 0.5, 0.7),
@@ -193,7 +196,7 @@ fn lamp() -> Light {
     }
 }
 
-fn draw(
+pub(crate) fn draw(
     renderer: &mut Renderer,
     head: &HeadOnGpu,
     state: &FaceState,

@@ -12,3 +12,6 @@ pub(crate) mod shadow;
 pub(crate) mod surface_frames;
 pub(crate) mod velocity;
 pub(crate) mod visibility;
+
+/// Pixels on a side of what a workgroup of blocks.wgsl does.
+pub(crate) const BLOCK_GROUP: u32 = 16;

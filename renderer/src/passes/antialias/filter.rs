@@ -3,7 +3,8 @@
 use super::reference::{Edges, Picture, Weights};
 use super::{Antialias, AntialiasError, Inputs, Mode, Settings};
 use crate::error::RenderError;
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
 use wgpu::{TextureFormat, TextureUsages};
 
 /// Filters images one after the other; images of the same size share what the device needs.

@@ -13,14 +13,20 @@ struct Params {
 @group(0) @binding(5) var hdr: texture_storage_2d<rgba16float, write>;
 
 @compute @workgroup_size(8, 8)
-fn compose(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= textureDimensions(hdr)) {
-        return;
+fn compose(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
+    for (var i = 0u; i < BLOCKS; i++) {
+        let at = block_pixel(group, local, i);
+        if all(at < textureDimensions(hdr)) {
+            compose_pixel(at);
+        }
     }
+}
+
+fn compose_pixel(at: vec2u) {
     var color = vec4f(params.background.rgb, 0.0);
-    if textureLoad(depth, id.xy, 0) > 0.0 {
-        let diffuse = textureLoad(scattered, id.xy, 0).rgb * textureLoad(albedo, id.xy, 0).rgb;
-        color = vec4f(diffuse + textureLoad(direct, id.xy, 0).rgb, 1.0);
+    if textureLoad(depth, at, 0) > 0.0 {
+        let diffuse = textureLoad(scattered, at, 0).rgb * textureLoad(albedo, at, 0).rgb;
+        color = vec4f(diffuse + textureLoad(direct, at, 0).rgb, 1.0);
     }
-    textureStore(hdr, id.xy, color);
+    textureStore(hdr, at, color);
 }

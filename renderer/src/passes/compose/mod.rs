@@ -9,10 +9,13 @@
 
 use glam::Vec3;
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
+use crate::passes::BLOCK_GROUP;
 
 /// WGSL of the pass.
-pub(crate) const SHADER: &str = include_str!("compose.wgsl");
+pub(crate) const SHADER: &str =
+    concat!(include_str!("../../shared/blocks.wgsl"), include_str!("compose.wgsl"));
 
 /// The pipeline of the pass.
 pub(crate) struct Compose {
@@ -43,6 +46,6 @@ impl Compose {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         let size = hdr.texture().size();
-        pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+        pass.dispatch_workgroups(size.width.div_ceil(BLOCK_GROUP), size.height.div_ceil(BLOCK_GROUP), 1);
     }
 }

@@ -29,18 +29,24 @@ fn srgb_from_linear(c: vec3f) -> vec3f {
 }
 
 @compute @workgroup_size(8, 8)
-fn display(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= textureDimensions(image)) {
-        return;
+fn display(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
+    for (var i = 0u; i < BLOCKS; i++) {
+        let at = block_pixel(group, local, i);
+        if all(at < textureDimensions(image)) {
+            display_pixel(at);
+        }
     }
+}
+
+fn display_pixel(at: vec2u) {
     // The tone map comes before the average: a bright highlight must not swallow the edge that it stands on.
     var sum = vec3f(0.0);
     for (var y = 0u; y < params.samples; y++) {
         for (var x = 0u; x < params.samples; x++) {
-            let c = textureLoad(hdr, id.xy * params.samples + vec2u(x, y), 0).rgb;
+            let c = textureLoad(hdr, at * params.samples + vec2u(x, y), 0).rgb;
             sum += filmic_curve(params.exposure * c) / filmic_curve(vec3f(WHITE));
         }
     }
     sum /= f32(params.samples * params.samples);
-    textureStore(image, id.xy, vec4f(srgb_from_linear(sum), 1.0));
+    textureStore(image, at, vec4f(srgb_from_linear(sum), 1.0));
 }

@@ -7,10 +7,13 @@
 //! Theory: exposure, the filmic curve of Hable 2010 (papers/004 section 8.3 and ch. 11: "really crisp blacks"),
 //! IEC 61966-2-1 transfer. With more than one sample a pixel (`ssaa`), each sample is tone mapped before the mean.
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
+use crate::pass_timer::PassTimer;
+use crate::passes::BLOCK_GROUP;
 
 /// WGSL of the pass.
-pub(crate) const SHADER: &str = include_str!("display.wgsl");
+pub(crate) const SHADER: &str =
+    concat!(include_str!("../../shared/blocks.wgsl"), include_str!("display.wgsl"));
 
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -56,6 +59,6 @@ impl Display {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         let size = image.texture().size();
-        pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+        pass.dispatch_workgroups(size.width.div_ceil(BLOCK_GROUP), size.height.div_ceil(BLOCK_GROUP), 1);
     }
 }

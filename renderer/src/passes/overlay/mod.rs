@@ -11,8 +11,9 @@
 
 use glam::Vec3;
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
+use crate::pass_timer::PassTimer;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(

@@ -11,8 +11,9 @@
 use glam::camera::rh::{proj, view};
 use glam::{Mat4, Vec3};
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
+use crate::pass_timer::PassTimer;
 use crate::scene::LightKind;
 
 /// WGSL of the pass.
@@ -118,15 +119,11 @@ impl Shadow {
             let group = gpu.bind_layout(
                 "shadow",
                 &self.pipeline.get_bind_group_layout(0),
-                &[
-                    clip_from_world.as_entire_binding(),
-                    positions.as_entire_binding(),
-                    head.vertices.as_entire_binding(),
-                    head.triangles.as_entire_binding(),
-                ],
+                &[clip_from_world.as_entire_binding(), positions.as_entire_binding()],
             );
             pass.set_bind_group(0, &group, &[]);
-            pass.draw(0..head.opaque_triangles * 3, 0..1);
+            pass.set_index_buffer(head.opaque_points.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..head.opaque_triangles * 3, 0, 0..1);
         }
     }
 }

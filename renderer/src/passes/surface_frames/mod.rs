@@ -12,8 +12,9 @@
 //!
 //! Cost: every vertex reads its ring of about six triangles; the positions stay in cache.
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
+use crate::pass_timer::PassTimer;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(

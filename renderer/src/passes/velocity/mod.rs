@@ -9,13 +9,16 @@
 //!
 //! Does not: follow what moves on the surface (blood, wrinkles), or the blended overlays.
 
-use crate::gpu::{Gpu, PassTimer};
+use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
+use crate::pass_timer::PassTimer;
+use crate::passes::BLOCK_GROUP;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(
     include_str!("../../shared/view.wgsl"),
     include_str!("../../shared/surface.wgsl"),
+    include_str!("../../shared/blocks.wgsl"),
     include_str!("velocity.wgsl")
 );
 
@@ -68,7 +71,7 @@ impl Velocity {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, &group, &[]);
             let size = velocity.texture().size();
-            pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+            pass.dispatch_workgroups(size.width.div_ceil(BLOCK_GROUP), size.height.div_ceil(BLOCK_GROUP), 1);
         }
     }
 }

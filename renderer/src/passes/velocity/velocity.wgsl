@@ -17,15 +17,21 @@ fn image_place(clip_from_world: mat4x4f, position: vec3f) -> vec2f {
 }
 
 @compute @workgroup_size(8, 8)
-fn velocity_main(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= view.size) {
-        return;
+fn velocity_main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
+    for (var i = 0u; i < BLOCKS; i++) {
+        let at = block_pixel(group, local, i);
+        if all(at < view.size) {
+            velocity_pixel(at);
+        }
     }
-    let seen = textureLoad(visible, id.xy, 0).x;
+}
+
+fn velocity_pixel(at: vec2u) {
+    let seen = textureLoad(visible, at, 0).x;
     if seen == 0u {
         // The background is infinitely far and does not move with the camera.
         if head.x == 0u {
-            textureStore(velocity, id.xy, vec4f(0.0));
+            textureStore(velocity, at, vec4f(0.0));
         }
         return;
     }
@@ -39,12 +45,12 @@ fn velocity_main(@builtin(global_invocation_id) id: vec3u) {
         positions[points.x].xyz - origin,
         positions[points.y].xyz - origin,
         positions[points.z].xyz - origin,
-        pixel_ray(view, vec2f(id.xy) + 0.5, view.jitter),
+        pixel_ray(view, vec2f(at) + 0.5, view.jitter),
     );
     let now = b.x * positions[points.x].xyz + b.y * positions[points.y].xyz + b.z * positions[points.z].xyz;
     let before = b.x * previous_positions[points.x].xyz
         + b.y * previous_positions[points.y].xyz
         + b.z * previous_positions[points.z].xyz;
     let motion = image_place(view.clip_from_world, now) - image_place(view.previous_clip_from_world, before);
-    textureStore(velocity, id.xy, vec4f(motion, 0.0, 0.0));
+    textureStore(velocity, at, vec4f(motion, 0.0, 0.0));
 }

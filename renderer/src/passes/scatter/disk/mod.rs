@@ -23,6 +23,9 @@ use super::gather::{Gather, Tap};
 use crate::error::RenderError;
 use crate::gpu::Gpu;
 
+/// Turn from one tap to the next, radians.
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+
 /// WGSL of the pass.
 pub(crate) const METHOD: &str = concat!(include_str!("../../../shared/math.wgsl"), include_str!("disk.wgsl"));
 
@@ -48,8 +51,17 @@ pub(crate) fn taps(profile: &Profile, count: usize) -> Result<(Vec<Tap>, [f64; 3
             let r = quantile((i as f64 + 0.5) / count as f64);
             let each: Vec<f64> = fits.iter().map(|f| f.reflectance(r) / f.mass_beyond(0.0)).collect();
             let density = each.iter().sum::<f64>() / 3.0;
-            let weight = [each[0], each[1], each[2]].map(|w| (w / density / count as f64) as f32);
-            Tap { place: [r as f32, 0.0, 0.0, 0.0], weight: [weight[0], weight[1], weight[2], 0.0] }
+            // The shader multiplies by the falloff at the tap's true distance.
+            let falloff = |c: usize| {
+                let e = (-r / (3.0 * fits[c].d_mm)).exp();
+                (e + e.powi(3)) / r
+            };
+            let weight = [0, 1, 2].map(|c| (each[c] / density / count as f64 / falloff(c)) as f32);
+            let angle = i as f64 * GOLDEN_ANGLE;
+            Tap {
+                place: [(r * angle.cos()) as f32, (r * angle.sin()) as f32, r as f32, 0.0],
+                weight: [weight[0], weight[1], weight[2], 0.0],
+            }
         })
         .collect();
     Ok((taps, [fits[0].d_mm, fits[1].d_mm, fits[2].d_mm]))
@@ -58,7 +70,7 @@ pub(crate) fn taps(profile: &Profile, count: usize) -> Result<(Vec<Tap>, [f64; 3
 /// The method for one profile.
 pub(crate) fn gather(gpu: &Gpu, profile: &Profile, count: usize) -> Result<Gather, RenderError> {
     let (taps, d) = taps(profile, count)?;
-    let half_width = taps.iter().map(|t| t.place[0]).fold(0.0, f32::max);
+    let half_width = taps.iter().map(|t| t.place[2]).fold(0.0, f32::max);
     let method = [d[0] as f32, d[1] as f32, d[2] as f32, 0.0];
     Ok(Gather::new(gpu, METHOD, &taps, half_width, half_width, method))
 }
