@@ -83,9 +83,8 @@ fn flat(side: u32, value: f32) -> Map {
 }
 
 fn map(width: u32, height: u32, value: impl Fn(f32, f32) -> f32) -> Map {
-    let at = |i: u32| {
-        value(((i % width) as f32 + 0.5) / width as f32, ((i / width) as f32 + 0.5) / height as f32)
-    };
+    let at =
+        |i: u32| value(((i % width) as f32 + 0.5) / width as f32, ((i / width) as f32 + 0.5) / height as f32);
     Map { width, height, channels: 1, values: (0..width * height).map(at).collect() }
 }
 
@@ -156,11 +155,30 @@ fn hemoglobin_of_every_format_goes_into_a_head() {
     let fear = folder.image("fear.tif", &coded(384), SampleKind::U16);
     let disgust = folder.image("disgust.exr", &map(192, 192, target), SampleKind::F32);
     let out = folder.path("out.glb");
-    let [anger, joy, fear, disgust] =
-        [("anger", anger), ("joy", joy), ("fear", fear), ("disgust", disgust)].map(|(n, f)| format!("{n}={f}"));
+    let [anger, joy, fear, disgust] = [("anger", anger), ("joy", joy), ("fear", fear), ("disgust", disgust)]
+        .map(|(n, f)| format!("{n}={f}"));
     let report = done(&[
-        "hemoglobin", "--into", &head, "-o", &out, "--neutral", &neutral, "--target", &anger, "--target", &joy,
-        "--target", &fear, "--target", &disgust, "--radius", "24", "--size", "32", "--licence", "CC-BY-4.0",
+        "hemoglobin",
+        "--into",
+        &head,
+        "-o",
+        &out,
+        "--neutral",
+        &neutral,
+        "--target",
+        &anger,
+        "--target",
+        &joy,
+        "--target",
+        &fear,
+        "--target",
+        &disgust,
+        "--radius",
+        "24",
+        "--size",
+        "32",
+        "--licence",
+        "CC-BY-4.0",
     ]);
     assert_eq!((&report["clamped_texels"], &report["radius_px"]), (&0.into(), &24.into()));
     assert_eq!(report["kept_distributions"], serde_json::json!(["blush"]));
@@ -214,15 +232,40 @@ fn masks_and_alpha_keep_the_background_out() {
     let neutral = folder.image("neutral.exr", &blood(0.04), SampleKind::F32);
     let joy = format!("joy={}", folder.image("joy.exr", &blood(0.06), SampleKind::F32));
     let out = folder.path("out.glb");
-    done(&["hemoglobin", "--into", &head_file, "-o", &out, "--neutral", &neutral, "--target", &joy, "--radius", "30"]);
+    done(&[
+        "hemoglobin",
+        "--into",
+        &head_file,
+        "-o",
+        &out,
+        "--neutral",
+        &neutral,
+        "--target",
+        &joy,
+        "--radius",
+        "30",
+    ]);
     let found = read(&out);
     let joy_map = found.maps.distributions.iter().find(|d| d.name == "joy").expect("joy");
     assert!(joy_map.bias.values.iter().all(|b| (b - 0.06).abs() < 2e-3), "the skin of the head is a mask");
 
     // Without a head: a drawn mask, and the alpha of an image.
-    let mask = folder.image("mask.png", &map(100, 100, |u, v| f32::from(u8::from(inside(u, v)))), SampleKind::U8);
+    let mask =
+        folder.image("mask.png", &map(100, 100, |u, v| f32::from(u8::from(inside(u, v)))), SampleKind::U8);
     let results = folder.path("results");
-    done(&["hemoglobin", "-o", &results, "--neutral", &neutral, "--target", &joy, "--mask", &mask, "--radius", "30"]);
+    done(&[
+        "hemoglobin",
+        "-o",
+        &results,
+        "--neutral",
+        &neutral,
+        "--target",
+        &joy,
+        "--mask",
+        &mask,
+        "--radius",
+        "30",
+    ]);
     let bias = load_image(&Path::new(&results).join("joy_bias.exr")).expect("a result").map;
     assert!(bias.values.iter().all(|b| (b - 0.06).abs() < 1e-6));
     let alpha = folder.path("alpha.png");
@@ -233,7 +276,19 @@ fn masks_and_alpha_keep_the_background_out() {
     });
     picture.save(&alpha).expect("a temporary image");
     let alpha = format!("joy={alpha}");
-    done(&["hemoglobin", "-o", &results, "--neutral", &neutral, "--target", &alpha, "--mask", &mask, "--radius", "30"]);
+    done(&[
+        "hemoglobin",
+        "-o",
+        &results,
+        "--neutral",
+        &neutral,
+        "--target",
+        &alpha,
+        "--mask",
+        &mask,
+        "--radius",
+        "30",
+    ]);
     let bias = load_image(&Path::new(&results).join("joy_bias.exr")).expect("a result").map;
     assert!(bias.values.iter().all(|b| (b - 48.0 / 255.0 * 0.32).abs() < 1e-6));
 }
@@ -273,7 +328,8 @@ fn hemoglobin_that_cannot_be_used_is_explained() {
     with(&good, &["--mask", &wide], &["wide.exr", "64x40", "64x64"]);
     refused(&folder, &["hemoglobin", "--neutral", &good], &["--into HEAD.glb"]);
     refused(&folder, &["hemoglobin", "--into", "gone.glb", "--neutral", &good], &["gone.glb"]);
-    let folder_out = maps(&["hemoglobin", "--into", &head_file, "-o", &folder.path("results"), "--neutral", &good]);
+    let folder_out =
+        maps(&["hemoglobin", "--into", &head_file, "-o", &folder.path("results"), "--neutral", &good]);
     assert_eq!(folder_out.status.code(), Some(2));
     let unknown = folder.text("m.json", r#"{ "neutral": "good.exr", "calibration": { "unit": "pints" } }"#);
     refused(&folder, &["hemoglobin", "--manifest", &unknown], &["m.json"]);
@@ -283,7 +339,8 @@ fn hemoglobin_that_cannot_be_used_is_explained() {
     // A constant map is no error: its rule is stated, and reported.
     let constant = format!("joy={}", image("constant.exr", &flat(64, 0.05)));
     let out = folder.path("constant.glb");
-    let report = done(&["hemoglobin", "--into", &head_file, "-o", &out, "--neutral", &good, "--target", &constant]);
+    let report =
+        done(&["hemoglobin", "--into", &head_file, "-o", &out, "--neutral", &good, "--target", &constant]);
     assert_eq!(report["constant_maps"], serde_json::json!(["joy"]));
     let found = read(&out);
     let joy = found.maps.distributions.iter().find(|d| d.name == "joy").expect("joy");
@@ -344,8 +401,11 @@ fn normal_maps_become_relief_and_wrinkles_of_a_head() {
     let normal = Vec3::new(0.5, -0.25, 1.0).normalize();
     let codes = |n: Vec3| (0.5 * n + 0.5).to_array();
     let opengl = folder.image("gl.png", &Map::filled(32, 32, &codes(normal)), SampleKind::U16);
-    let directx =
-        folder.image("dx.png", &Map::filled(32, 32, &codes(normal * Vec3::new(1.0, -1.0, 1.0))), SampleKind::U8);
+    let directx = folder.image(
+        "dx.png",
+        &Map::filled(32, 32, &codes(normal * Vec3::new(1.0, -1.0, 1.0))),
+        SampleKind::U8,
+    );
     let out = folder.path("out.glb");
     for (file, extra, tolerance) in [(&opengl, &[][..], 1e-3), (&directx, &["--directx"][..], 1e-2)] {
         done(&[&["normals", file, "--to", "slopes", "--into", &head_file, "-o", &out], extra].concat());
@@ -355,11 +415,29 @@ fn normal_maps_become_relief_and_wrinkles_of_a_head() {
     // A second wrinkle map, less its base, with two zones from the channels of one image.
     let masks = folder.path("masks.png");
     image::RgbaImage::from_pixel(16, 16, image::Rgba([255, 0, 102, 51])).save(&masks).expect("an image");
-    let base = folder.image("base.png", &Map::filled(32, 32, &codes(Vec3::new(0.5, 0.0, 1.0).normalize())), SampleKind::U16);
+    let base = folder.image(
+        "base.png",
+        &Map::filled(32, 32, &codes(Vec3::new(0.5, 0.0, 1.0).normalize())),
+        SampleKind::U16,
+    );
     let (brow, nose) = (format!("brow={masks}#b"), format!("nose={masks}#a"));
     let report = done(&[
-        "normals", &opengl, "--to", "wrinkles", "--base", &base, "--into", &head_file, "-o", &out,
-        "--wrinkle-map", "1", "--zone", &brow, "--zone", &nose,
+        "normals",
+        &opengl,
+        "--to",
+        "wrinkles",
+        "--base",
+        &base,
+        "--into",
+        &head_file,
+        "-o",
+        &out,
+        "--wrinkle-map",
+        "1",
+        "--zone",
+        &brow,
+        "--zone",
+        &nose,
     ]);
     assert_eq!(report["zones_without_expression"], serde_json::Value::Null, "the head has no rig of its own");
     let found = read(&out);
@@ -382,7 +460,11 @@ fn normal_maps_become_relief_and_wrinkles_of_a_head() {
     let mut broken = Map::filled(4, 4, &[0.5, 0.5, 1.0]);
     broken.values[5] = f32::INFINITY;
     let broken = folder.image("broken.exr", &broken, SampleKind::F32);
-    refused(&folder, &["normals", &broken, "--to", "slopes", "--into", &head_file], &["broken.exr", "texel (1, 0)"]);
+    refused(
+        &folder,
+        &["normals", &broken, "--to", "slopes", "--into", &head_file],
+        &["broken.exr", "texel (1, 0)"],
+    );
 }
 
 #[test]
@@ -417,7 +499,15 @@ fn the_changes_of_one_head_cross_to_another() {
         {"receiver": [0.1, 0.9], "giver": [0.9, 0.9]}, {"receiver": [0.9, 0.9], "giver": [0.9, 0.1]}]"#;
     let pairs = folder.text("pairs.json", pairs);
     let report = done(&[
-        "transfer", "--from", &giver_file, "--into", &receiver_file, "-o", &out, "--correspondences", &pairs,
+        "transfer",
+        "--from",
+        &giver_file,
+        "--into",
+        &receiver_file,
+        "-o",
+        &out,
+        "--correspondences",
+        &pairs,
     ]);
     assert_eq!(report["through"], "correspondences");
     let again = &read(&out).maps.distributions[0].bias;
@@ -429,8 +519,16 @@ fn the_changes_of_one_head_cross_to_another() {
     unmarked.landmarks.clear();
     let unmarked = folder.head("unmarked.glb", &unmarked);
     refused(&folder, &["transfer", "--from", &giver_file, "--into", &unmarked], &["common landmarks", "0"]);
-    refused(&folder, &["transfer", "--from", &receiver_file, "--into", &giver_file], &["without distributions"]);
-    refused(&folder, &["transfer", "--from", &giver_file, "--into", &giver_file, "--only", "rage"], &["rage", "blush"]);
+    refused(
+        &folder,
+        &["transfer", "--from", &receiver_file, "--into", &giver_file],
+        &["without distributions"],
+    );
+    refused(
+        &folder,
+        &["transfer", "--from", &giver_file, "--into", &giver_file, "--only", "rage"],
+        &["rage", "blush"],
+    );
     let line = r#"[{"receiver": [0, 0], "giver": [0, 0]}, {"receiver": [0.5, 0.5], "giver": [1, 1]},
         {"receiver": [1, 1], "giver": [0.3, 0.2]}]"#;
     let line = folder.text("line.json", line);
@@ -474,7 +572,11 @@ fn the_maps_of_a_head_come_out_as_they_are() {
     let names: Vec<_> = list["maps"].as_array().expect("a list").iter().map(|m| m["name"].clone()).collect();
     assert!(names.contains(&"blush_bias".into()) && names.contains(&"zone_chin".into()), "{names:?}");
     let textures = list["on_the_graphics_card"].as_array().expect("a list");
-    assert!(textures.iter().any(|t| t["texture"] == "wrinkles" && t["bytes"].as_u64() > t["block_bytes"].as_u64()));
+    assert!(
+        textures
+            .iter()
+            .any(|t| t["texture"] == "wrinkles" && t["bytes"].as_u64() > t["block_bytes"].as_u64())
+    );
     let images = folder.path("images");
     done(&["extract", &file, "-o", &images]);
     let blood = load_image(&Path::new(&images).join("hemoglobin.exr")).expect("an image").map;

@@ -532,7 +532,17 @@ impl Renderer {
                     let fresh = gpu.device.create_command_encoder(&Default::default());
                     gpu.queue.submit([std::mem::replace(encoder, fresh).finish()]);
                     let appearance = settings.appearance;
-                    integrate(gpu, &self.shade, scene, &heads, &lighting, &integral, &inputs, appearance, batches)?;
+                    integrate(
+                        gpu,
+                        &self.shade,
+                        scene,
+                        &heads,
+                        &lighting,
+                        &integral,
+                        &inputs,
+                        appearance,
+                        batches,
+                    )?;
                     integral.record_finish(gpu, encoder, timer, &inputs);
                     scatter_noise = integral.relative_noise(gpu)?;
                     &targets.scattered

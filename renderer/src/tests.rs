@@ -17,8 +17,8 @@ use crate::passes::{
 };
 use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
 use crate::{
-    AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
-    Renderer, ScatterMethod, Scene, Settings, TransmitMethod,
+    AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light,
+    LightKind, RenderError, Renderer, ScatterMethod, Scene, Settings, TransmitMethod,
 };
 
 #[test]

@@ -59,10 +59,8 @@ fn main() {
     // The direct sum on a few rows, scaled up.
     let rows = 2 * rayon::current_num_threads();
     let start = Instant::now();
-    let checksum: f64 = (0..rows * side)
-        .into_par_iter()
-        .map(|i| direct(&map, radius, i % side, side / 2 + i / side).1)
-        .sum();
+    let checksum: f64 =
+        (0..rows * side).into_par_iter().map(|i| direct(&map, radius, i % side, side / 2 + i / side).1).sum();
     let seconds = start.elapsed().as_secs_f64() * side as f64 / rows as f64;
     println!("direct sum, from {rows} rows:  {seconds:8.1} s ({checksum:.3e})");
 }

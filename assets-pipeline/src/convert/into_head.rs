@@ -188,11 +188,7 @@ fn require_slopes(map: &Map) -> Result<(), ConvertError> {
 }
 
 /// Distributions of a head that `replaced` does not name, on a new local mean.
-fn follow(
-    head: &Head,
-    mean: &Map,
-    replaced: &[Distribution],
-) -> Result<Vec<Distribution>, ConvertError> {
+fn follow(head: &Head, mean: &Map, replaced: &[Distribution]) -> Result<Vec<Distribution>, ConvertError> {
     let Some(old_mean) = &head.maps.hemoglobin_mean else { return Ok(Vec::new()) };
     let stay = head.maps.distributions.iter().filter(|d| replaced.iter().all(|r| r.name != d.name));
     stay.map(|d| {

@@ -31,8 +31,7 @@ pub struct Prediction {
 /// # Panics
 /// When `deformed` has another length than the head's points.
 pub fn predict(head: &Head, model: &StrainModel, name: &str, deformed: &[Vec3], mean: &Map) -> Prediction {
-    let strain: Vec<_> =
-        point_strain(&head.mesh, deformed).iter().map(|s| model.predict(s)).collect();
+    let strain: Vec<_> = point_strain(&head.mesh, deformed).iter().map(|s| model.predict(s)).collect();
     let texels = SkinTexels::new(head, mean.width, mean.height);
     let field = |value: fn(&rubor_rig::strain::StrainPrediction) -> f32| {
         texels.map_of_points(&strain.iter().map(value).collect::<Vec<_>>())
@@ -87,7 +86,8 @@ mod tests {
     fn a_squeezed_sheet_drains_everywhere_and_wrinkles_in_its_zones() {
         let mut head = sheet(Vec2::ZERO, Vec2::new(0.5, 1.0));
         head.maps.wrinkle_slopes = vec![Map::filled(1, 1, &[0.1, 0.0])];
-        let zone = |name: &str, v| WrinkleZone { name: name.into(), wrinkle_map: 0, mask: Map::filled(2, 2, &[v]) };
+        let zone =
+            |name: &str, v| WrinkleZone { name: name.into(), wrinkle_map: 0, mask: Map::filled(2, 2, &[v]) };
         head.maps.zones = vec![zone("all", 1.0), zone("none", 0.0)];
         let squeezed: Vec<Vec3> = head.mesh.points.iter().map(|p| Vec3::new(0.8 * p.x, p.y, p.z)).collect();
         let mean = Map::filled(16, 16, &[0.05]);

@@ -69,8 +69,8 @@ impl<'a> SkinTexels<'a> {
     pub fn position(&self, x: u32, y: u32) -> Option<Vec3> {
         let mesh = &self.head.mesh;
         let (index, weights) = self.at(x, y)?;
-        let [a, b, c] = mesh.triangles[index as usize]
-            .map(|v| mesh.points[mesh.vertices[v as usize].point as usize]);
+        let [a, b, c] =
+            mesh.triangles[index as usize].map(|v| mesh.points[mesh.vertices[v as usize].point as usize]);
         Some(a * weights.x + b * weights.y + c * weights.z)
     }
 
@@ -154,10 +154,8 @@ pub(super) mod tests {
     /// A square sheet 1 m wide whose texture fills a part of the unit square.
     pub(in crate::convert) fn sheet(low: Vec2, high: Vec2) -> Head {
         let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
-        let vertices = corners.iter().enumerate().map(|(i, c)| Vertex {
-            point: i as u32,
-            uv: low + *c * (high - low),
-        });
+        let vertices =
+            corners.iter().enumerate().map(|(i, c)| Vertex { point: i as u32, uv: low + *c * (high - low) });
         let mesh = Mesh {
             points: corners.iter().map(|c| Vec3::new(c.x, 1.0 - c.y, 0.0)).collect(),
             vertices: vertices.collect(),

@@ -128,13 +128,8 @@ impl Skin {
             return Err(ConvertError::argument("giver", found, "triangles of the material skin"));
         }
         let cell_metres = extent / CELLS;
-        let mut skin = Self {
-            triangles,
-            cells: HashMap::new(),
-            cell_metres,
-            low: IVec3::MAX,
-            high: IVec3::MIN,
-        };
+        let mut skin =
+            Self { triangles, cells: HashMap::new(), cell_metres, low: IVec3::MAX, high: IVec3::MIN };
         for (i, t) in skin.triangles.iter().enumerate() {
             let [a, b, c] = t.map(|c| c.0);
             let (low, high) = (skin.cell(a.min(b).min(c)), skin.cell(a.max(b).max(c)));

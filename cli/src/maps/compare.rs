@@ -96,8 +96,7 @@ pub(super) fn run(a: &CompareArgs) -> Outcome<Value> {
     let contrast = local_statistics(&base, &mask, a.radius).map_err(wrong)?;
     let covered = contrast.covered.and(&mask);
     let deviations = contrast.deviation.values.iter().zip(&covered.mapped).filter(|(_, m)| **m);
-    let mean_deviation =
-        deviations.map(|(v, _)| f64::from(*v)).sum::<f64>() / covered.count().max(1) as f64;
+    let mean_deviation = deviations.map(|(v, _)| f64::from(*v)).sum::<f64>() / covered.count().max(1) as f64;
     Ok(json!({
         "gaussian": map_difference(&exact, &gaussian, &mask),
         "reduced": map_difference(&exact, &reduced, &mask),

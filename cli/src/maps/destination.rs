@@ -61,9 +61,9 @@ impl Destination {
                     .hint("--into HEAD.glb names the head that receives the maps"))
             }
             None => Ok(None),
-            Some(_) if !is_head_file(&self.output) => {
-                Err(Failure::input(format!("--output {output}: with --into expected a name that ends in .glb")))
-            }
+            Some(_) if !is_head_file(&self.output) => Err(Failure::input(format!(
+                "--output {output}: with --into expected a name that ends in .glb"
+            ))),
             Some(path) => inputs::head(Some(path)).map(Some),
         }
     }

@@ -131,7 +131,8 @@ fn print_fields(report: &Value) {
                 for item in items {
                     match item.as_object() {
                         Some(fields) => {
-                            let title = ["name", "region", "texture"].into_iter().find(|k| fields.contains_key(*k));
+                            let title =
+                                ["name", "region", "texture"].into_iter().find(|k| fields.contains_key(*k));
                             let rest: Vec<_> = (fields.iter())
                                 .filter(|(k, _)| Some(k.as_str()) != title)
                                 .map(|(k, v)| format!("{k} {}", plain(v)))

@@ -117,8 +117,7 @@ fn put(a: &NormalsArgs, mut receiver: LoadedHead, slopes: Map, report: &mut Valu
         }
         let of_map = |index: usize| receiver.head.maps.zones.iter().any(|z| z.wrinkle_map as usize == index);
         if !of_map(a.wrinkle_map) {
-            report["notes"] =
-                json!(["no zone shows this wrinkle map: --zone NAME=MASK adds one"]);
+            report["notes"] = json!(["no zone shows this wrinkle map: --zone NAME=MASK adds one"]);
         }
     }
     a.destination.write(&receiver)
@@ -191,7 +190,14 @@ fn zone(text: &str) -> Outcome<(String, Map)> {
         Some(3) => image.alpha.clone().ok_or_else(|| lacks("alpha"))?,
         Some(c) if c < image.map.channels => Map {
             channels: 1,
-            values: image.map.values.iter().skip(c as usize).step_by(image.map.channels as usize).copied().collect(),
+            values: image
+                .map
+                .values
+                .iter()
+                .skip(c as usize)
+                .step_by(image.map.channels as usize)
+                .copied()
+                .collect(),
             ..image.map
         },
         Some(_) => return Err(lacks("such channel")),

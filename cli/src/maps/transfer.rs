@@ -164,8 +164,8 @@ fn warp(
     if let Some(file) = &a.correspondences {
         let text = std::fs::read_to_string(file)
             .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", file.display())))?;
-        let pairs: Vec<Correspondence> = serde_json::from_str(&text)
-            .map_err(|e| Failure::input(format!("{}: {e}", file.display())))?;
+        let pairs: Vec<Correspondence> =
+            serde_json::from_str(&text).map_err(|e| Failure::input(format!("{}: {e}", file.display())))?;
         return Ok((Warp::through(&pairs)?, "correspondences"));
     }
     match (giver, receiver) {

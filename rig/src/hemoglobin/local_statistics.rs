@@ -320,7 +320,15 @@ mod tests {
 
     #[test]
     fn statistics_are_those_of_a_direct_sum_at_odd_sizes() {
-        for (w, h, r) in [(27u32, 51u32, 5u32), (530, 9, 3), (8, 8, 8), (1, 1, 1), (5, 140, 2), (70, 150, 23), (200, 3, 40)] {
+        for (w, h, r) in [
+            (27u32, 51u32, 5u32),
+            (530, 9, 3),
+            (8, 8, 8),
+            (1, 1, 1),
+            (5, 140, 2),
+            (70, 150, 23),
+            (200, 3, 40),
+        ] {
             let n = (w * h) as usize;
             let mask = Mask { width: w, height: h, mapped: (0..n).map(|i| noise(i + 77) > 0.3).collect() };
             let values = (0..n)
