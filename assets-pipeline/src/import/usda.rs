@@ -353,7 +353,7 @@ impl Reader<'_> {
                 "variantSet" => {
                     self.string()?;
                     self.expect(b'=', "variants")?;
-                    self.variants(level)?;
+                    self.variants()?;
                 }
                 "reorder" => {
                     self.word();
@@ -372,7 +372,7 @@ impl Reader<'_> {
     }
 
     /// Passes over `{ "name" { ... } ... }`.
-    fn variants(&mut self, level: usize) -> Result<(), UsdaError> {
+    fn variants(&mut self) -> Result<(), UsdaError> {
         self.expect(b'{', "variants")?;
         while !self.take(b'}') {
             if self.string()?.is_none() {
@@ -396,7 +396,6 @@ impl Reader<'_> {
                 }
             }
         }
-        let _ = level;
         Ok(())
     }
 
