@@ -223,6 +223,10 @@ pub fn fit(breaks: &Breaks, f: &dyn Fn(f64) -> Vec<f32>, tolerance: f32, only_li
                 keys.push(key(time, values));
             }
         }
+        // A last key at the end, so that a player that loops keeps the length.
+        if keys.len() > 1 && keys.last().is_some_and(|k| k.time_s < breaks.end_s as f32) {
+            keys.push(key(breaks.end_s, &end));
+        }
         return Curve { interpolation: Interpolation::Step, keys };
     }
     let straight = (0.5 * tolerance).max(ROUNDING);
@@ -432,7 +436,7 @@ mod tests {
         assert_eq!(curve.interpolation, Interpolation::Step);
         assert_eq!(
             curve.keys.iter().map(|k| (k.time_s, k.values[0])).collect::<Vec<_>>(),
-            [(0.0, 0.0), (0.4, 1.0), (0.7, 0.25)]
+            [(0.0, 0.0), (0.4, 1.0), (0.7, 0.25), (1.0, 0.25)]
         );
         let lines = track(&[(0.25, 0.0, Ease::Linear), (0.5, 1.0, Ease::Linear), (1.0, 0.5, Ease::Linear)]);
         let curve = fitted(std::slice::from_ref(&lines), 1.0, 0.0);
