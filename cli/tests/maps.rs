@@ -188,8 +188,13 @@ fn hemoglobin_of_every_format_goes_into_a_head() {
     let mean = found.maps.hemoglobin_mean.as_ref().expect("a mean");
     assert!(mean.values.iter().all(|m| (m - 0.04).abs() < 4e-3), "local means of a texture about 4 %");
     for d in &found.maps.distributions[1..] {
-        // 8 bits are steps of 0.00126 beside a deviation of 0.008; the larger file was averaged by area.
-        let tolerance = if d.name == "anger" { 0.04 } else { 0.02 };
+        // 8 bits are steps of 0.00126 beside a deviation of 0.008. Averaging a file of twice the size takes 4 % of the
+        // contrast of waves that are 7 texels long: cos(pi / 14) along one axis, cos(pi / 17) along the other.
+        let tolerance = match d.name.as_str() {
+            "anger" => 0.04,
+            "fear" => 0.1,
+            _ => 0.02,
+        };
         for (i, (scale, bias)) in d.scale.values.iter().zip(&d.bias.values).enumerate() {
             assert!((scale - 2.0).abs() < tolerance, "{}: scale {scale}", d.name);
             let expected = 0.07 + 2.0 * (mean.values[i] - 0.04);
@@ -207,7 +212,7 @@ fn hemoglobin_of_every_format_goes_into_a_head() {
     assert!(origin("maps.distributions").source.contains("anger.png"));
 
     // A manifest with calibrations, on the head's own neutral blood.
-    folder.image("percent.exr", &map(128, 128, |u, v| 50.0 - 100.0 * target(u, v)), SampleKind::F32);
+    folder.image("percent.exr", &map(192, 192, |u, v| 50.0 - 100.0 * target(u, v)), SampleKind::F32);
     let manifest = folder.text(
         "maps.json",
         r#"{ "distributions": [{ "name": "exercise", "file": "percent.exr",
