@@ -17,8 +17,7 @@ use rubor_renderer::{
 };
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
-use rubor_rig::head::{Head, Material};
-use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
+use rubor_rig::head::Head;
 use rubor_rig::timeline::Sequence;
 use serde_json::json;
 
@@ -202,7 +201,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         }
     }
     if !arguments.no_export {
-        export_animated(&job, &evaluators, &arguments.output)?;
+        export_animated(&job, &arguments.output)?;
     }
     let gpu = &studio.renderer.gpu().info;
     let stats = json!({
@@ -313,46 +312,18 @@ fn shots_of(evaluators: &[Evaluator], frame: u32) -> Vec<Shot> {
     shots
 }
 
-/// Writes the (first) head with its performance as morph weights and node motion.
-fn export_animated(job: &Job, evaluators: &[Evaluator], folder: &Path) -> Outcome {
-    let (Some(loaded), Some(evaluator)) = (job.heads.first(), evaluators.first()) else { return Ok(()) };
-    let frames = (0..evaluator.frame_count())
-        .map(|i| {
-            let shot = evaluator.at(evaluator.frame_time_s(i));
-            export::gltf::Frame {
-                time_s: shot.time_s as f32,
-                weights: shot.face.shapes,
-                rotation: shot.face.head_rotation,
-                translation: shot.face.head_translation,
-            }
-        })
-        .collect();
+/// Writes the (first) head with its performance.
+fn export_animated(job: &Job, folder: &Path) -> Outcome {
+    let Some(loaded) = job.heads.first() else { return Ok(()) };
     let options = export::gltf::Options {
-        base_color: neutral_color(&loaded.head, 2048),
-        rig: Some(serde_json::to_value(&job.rig).map_err(Failure::job)?),
-        frames,
+        rig: Some(&job.rig),
+        sequence: Some(&job.sequence),
+        shape_colors: true,
         ..export::gltf::Options::default()
     };
-    export::gltf::write(&loaded.head, &options, &folder.join(HEAD_FILE)).map_err(Failure::job)
-}
-
-/// The skin of the neutral face as other viewers show it: sRGB, from the chromophore maps, at most
-/// `side` texels wide.
-pub(crate) fn neutral_color(head: &Head, side: u32) -> Option<RgbImage> {
-    let maps = &head.maps;
-    let (melanin, hemoglobin) = (maps.melanin.as_ref()?, maps.hemoglobin.as_ref()?);
-    if !head.mesh.parts.iter().any(|p| p.material == Material::Skin) {
-        return None;
-    }
-    let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
-    let side = melanin.width.max(hemoglobin.width).min(side);
-    Some(RgbImage::from_fn(side, side, |x, y| {
-        let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
-        let skin = lookup.sample(melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));
-        let hair = maps.hair.as_ref().map_or(0.0, |h| h.sample(u, v, 0));
-        let rgb = std::array::from_fn(|c| skin[c] + hair * (maps.hair_color_linear[c] - skin[c]));
-        image::Rgb(rgb.map(|c| (rubor_rig::color::srgb_encode(c) * 255.0).round() as u8))
-    }))
+    // What has no effect on the head was said before the first frame.
+    export::gltf::write(&loaded.head, &options, &folder.join(HEAD_FILE)).map_err(Failure::job)?;
+    Ok(())
 }
 
 /// GPU times over frames.

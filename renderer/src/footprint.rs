@@ -37,8 +37,7 @@ struct Storage {
     block_bytes: u64,
 }
 
-const COLOR: Storage =
-    Storage { format: "rgba8unorm", texel_bytes: 4, block_format: "BC7", block_bytes: 16 };
+const COLOR: Storage = Storage { format: "rgba8unorm", texel_bytes: 4, block_format: "BC7", block_bytes: 16 };
 const GLOSS: Storage = Storage { format: "rg8unorm", texel_bytes: 2, block_format: "BC5", block_bytes: 16 };
 const SLOPES: Storage =
     Storage { format: "rgba16float", texel_bytes: 8, block_format: "BC5 + BC4", block_bytes: 24 };
@@ -76,13 +75,7 @@ pub(crate) fn mask_size(maps: &SkinMaps) -> [u32; 2] {
     largest_of(maps.zones.iter().map(|z| &z.mask))
 }
 
-fn entry(
-    texture: &'static str,
-    size: [u32; 2],
-    layers: u32,
-    has_mips: bool,
-    storage: &Storage,
-) -> Footprint {
+fn entry(texture: &'static str, size: [u32; 2], layers: u32, has_mips: bool, storage: &Storage) -> Footprint {
     let mut levels = vec![size];
     while has_mips && levels[levels.len() - 1] != [1, 1] {
         levels.push(levels[levels.len() - 1].map(|n| (n / 2).max(1)));
@@ -111,7 +104,8 @@ mod tests {
     fn the_wrinkles_of_the_thesis_take_what_it_says() {
         // 256 x 256 wrinkles and eight zones of 64 x 64 in two textures: 96 KB with mip levels, of which its masks
         // have some that ours do without.
-        let zone = |i| WrinkleZone { name: format!("{i}"), wrinkle_map: 0, mask: Map::filled(64, 64, &[1.0]) };
+        let zone =
+            |i| WrinkleZone { name: format!("{i}"), wrinkle_map: 0, mask: Map::filled(64, 64, &[1.0]) };
         let maps = SkinMaps {
             melanin: Some(Map::filled(1, 1, &[0.1])),
             hemoglobin: Some(Map::filled(1, 1, &[0.1])),

@@ -93,7 +93,8 @@ pub(crate) struct View {
     pub(crate) near: f32,
     pub(crate) light_count: u32,
     pub(crate) shading_jitter: [f32; 2],
-    pub(crate) padding: [f32; 2],
+    pub(crate) depth_origin_mm: f32,
+    pub(crate) padding: f32,
 }
 
 /// Draws scenes. Keeps pipelines, and images of the last size, between frames; nothing else carries over.
@@ -344,9 +345,13 @@ impl Renderer {
     pub fn read_diffuse(&self) -> Result<Vec<[f32; 4]>, RenderError> {
         let Some(targets) = &self.targets else { return Ok(Vec::new()) };
         let image = if self.is_scattered { &targets.scattered } else { &targets.irradiance };
-        let halves: Vec<[half::f16; 4]> =
-            bytemuck::pod_collect_to_vec(&self.gpu.read_texture(image.texture())?);
-        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
+        let read = |image: &wgpu::TextureView| -> Result<Vec<[half::f16; 4]>, RenderError> {
+            Ok(bytemuck::pod_collect_to_vec(&self.gpu.read_texture(image.texture())?))
+        };
+        let (light, strength) = (read(image)?, read(&targets.albedo)?);
+        let pixel =
+            |([r, g, b, _], [.., a]): ([half::f16; 4], [half::f16; 4])| [r, g, b, a].map(half::f16::to_f32);
+        Ok(light.into_iter().zip(strength).map(pixel).collect())
     }
 
     fn check(&self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
@@ -507,6 +512,7 @@ impl Renderer {
 
             let images = Images {
                 irradiance: &targets.irradiance,
+                albedo: &targets.albedo,
                 depth: &sample.depth,
                 scratch: &targets.scratch,
                 scattered: &targets.scattered,
@@ -518,6 +524,7 @@ impl Renderer {
                         view: &view,
                         ids: &sample.ids,
                         irradiance: &targets.irradiance,
+                        albedo: &targets.albedo,
                         depth: &sample.depth,
                         scattered: &targets.scattered,
                     };
@@ -635,8 +642,19 @@ fn view(
         near: NEAR_METRES,
         light_count: scene.lights.len() as u32,
         shading_jitter,
-        padding: [0.0; 2],
+        depth_origin_mm: 1000.0 * nearest_head(scene, &view_from_world),
+        padding: 0.0,
     }
+}
+
+/// View depth of the nearest head, between its middle and its front, metres: depths near it are kept best.
+fn nearest_head(scene: &Scene<'_>, view_from_world: &Mat4) -> f32 {
+    let depth = |instance: &crate::scene::HeadInstance<'_>| {
+        let (low, high) = instance.head.bounds;
+        let middle = world_from_head(instance).transform_point3(0.5 * (low + high));
+        -view_from_world.transform_point3(middle).z - 0.25 * (high - low).min_element()
+    };
+    scene.heads.iter().map(depth).filter(|d| *d > 0.0).reduce(f32::min).unwrap_or(0.0)
 }
 
 /// Size of the picture with its surroundings over its own, for light that comes in from outside of it.

@@ -48,7 +48,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             previous_clip_from_world as "previous_clip_from_world", origin as "origin", right as "right",
             up as "up", forward as "forward", size as "size", head_count as "head_count",
             has_environment as "has_environment", jitter as "jitter", near as "near",
-            light_count as "light_count", shading_jitter as "shading_jitter"),
+            light_count as "light_count", shading_jitter as "shading_jitter", depth_origin_mm as "depth_origin_mm"),
     );
     assert_layout(
         &visibility::shader(false),

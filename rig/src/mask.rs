@@ -72,7 +72,7 @@ pub fn resize_area(map: &Map, mask: &Mask, width: u32, height: u32) -> (Map, Mas
     let count = width as usize * height as usize;
     let mut out = Map { width, height, channels: map.channels, values: vec![0.0; count * channels] };
     let mut mapped = vec![false; count];
-    let row = |((rows, out), mapped): ((&Vec<(usize, f64)>, &mut [f32]), &mut [bool])| {
+    let row = |rows: &[(usize, f64)], out: &mut [f32], mapped: &mut [bool]| {
         let mut sums = vec![0.0f64; channels];
         for ((columns, out), mapped) in xs.iter().zip(out.chunks_exact_mut(channels)).zip(mapped) {
             sums.fill(0.0);
@@ -99,7 +99,7 @@ pub fn resize_area(map: &Map, mask: &Mask, width: u32, height: u32) -> (Map, Mas
     ys.par_iter()
         .zip(out.values.par_chunks_exact_mut(width as usize * channels))
         .zip(mapped.par_chunks_exact_mut(width as usize))
-        .for_each(row);
+        .for_each(|((rows, out), mapped)| row(rows, out, mapped));
     (out, Mask { width, height, mapped })
 }
 

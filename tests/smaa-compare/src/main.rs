@@ -6,11 +6,10 @@
 //!
 //! `RUBOR_RUNS` sets how often each time is taken (default 20, the median counts).
 
-use rubor_renderer::antialias::{
-    Antialias, BlendSpace, DiagonalEdges, Dispatch, Filter, History, Inputs, Mode, Preset, Settings,
-    reference::Picture,
-};
 use rubor_renderer::{Gpu, PassTimer};
+use rubor_renderer::antialias::{
+    Antialias, BlendSpace, Filter, reference::Picture, Dispatch, History, Inputs, Mode, Preset, Settings,
+};
 use std::time::Instant;
 use wgpu::{TextureFormat, TextureUsages};
 
@@ -33,9 +32,7 @@ fn main() -> Result<()> {
     let runs: usize = std::env::var("RUBOR_RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(20);
     println!("adapter: {} ({:?}, {})", gpu.info.name, gpu.info.backend, gpu.info.driver_info);
     println!("\npixels, luma edges, preset high, mixed as stored");
-    println!(
-        "image                      within 1/255   mean difference/255   largest/255   changed pixels within 1/255"
-    );
+    println!("image                      within 1/255   mean difference/255   largest/255   changed pixels within 1/255");
     let mut first = None;
     for path in std::env::args().skip(1) {
         let image = image::open(&path)?.to_rgba8();
@@ -71,8 +68,7 @@ fn main() -> Result<()> {
 fn as_published() -> Settings {
     Settings {
         blend_space: BlendSpace::Stored,
-        diagonal_edges: DiagonalEdges::Published,
-        ..Settings::new(Mode::Smaa1x, Preset::High)
+        ..Settings::published(Mode::Smaa1x, Preset::High)
     }
 }
 
@@ -100,9 +96,7 @@ fn explain(gpu: &Gpu, image: &image::RgbaImage, ours: &[u8], theirs: &[u8]) -> R
         }
     }
     for (name, [all, two, four]) in ["2 to 3", "over 3"].into_iter().zip(counts) {
-        println!(
-            "    differences of {name:<7} {all:>5}: directions within 2/255 at {two:>5}, within 4/255 at {four:>5}"
-        );
+        println!("    differences of {name:<7} {all:>5}: directions within 2/255 at {two:>5}, within 4/255 at {four:>5}");
     }
     Ok(())
 }
@@ -242,10 +236,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn times(gpu: &Gpu, image: &image::RgbaImage, runs: usize) -> Result<()> {
     let bench = Bench::new(gpu, image)?;
     let (input, output) = (Bench::view(&bench.input), Bench::view(&bench.output));
-    println!(
-        "\n{} x {}, median of {runs}            wall ms   device ms   passes   MiB",
-        bench.size[0], bench.size[1]
-    );
+    println!("\n{} x {}, median of {runs}            wall ms   device ms   passes   MiB", bench.size[0], bench.size[1]);
     let mut target = bench.their_target(gpu);
     let mut wall = Vec::new();
     for run in 0..runs + 3 {
@@ -263,8 +254,7 @@ fn times(gpu: &Gpu, image: &image::RgbaImage, runs: usize) -> Result<()> {
     }
     println!("smaa crate 1x high                   {:>9.3}", median(wall));
 
-    let velocity =
-        gpu.target("velocity", bench.size, TextureFormat::Rg32Float, TextureUsages::TEXTURE_BINDING);
+    let velocity = gpu.target("velocity", bench.size, TextureFormat::Rg32Float, TextureUsages::TEXTURE_BINDING);
     let velocity = Bench::view(&velocity);
     for (mode, preset, dispatch) in [
         (Mode::Smaa1x, Preset::High, Dispatch::Tiles),
@@ -285,12 +275,8 @@ fn times(gpu: &Gpu, image: &image::RgbaImage, runs: usize) -> Result<()> {
         for run in 0..runs + 3 {
             timer.restart();
             let colors = vec![&input; mode.subsamples(0).len()];
-            let inputs = Inputs {
-                colors: &colors,
-                velocity: Some(&velocity),
-                frame: run as u64,
-                ..Default::default()
-            };
+            let inputs =
+                Inputs { colors: &colors, velocity: Some(&velocity), frame: run as u64, ..Default::default() };
             wait(gpu)?;
             let started = Instant::now();
             let mut encoder = gpu.device.create_command_encoder(&Default::default());

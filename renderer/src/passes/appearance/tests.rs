@@ -12,8 +12,11 @@ use crate::{ColorTable, HeadOnGpu, MAX_HEMOGLOBIN, MAX_WRINKLE_MAPS, Renderer, f
 const SIZE: usize = 24;
 
 /// A table whose red is the address of hemoglobin, so that an albedo tells the blood that made it.
-const ADDRESS_TABLE: ColorTable<'static> =
-    ColorTable { width: 2, height: 2, texels: &[[0.0, 0.5, 0.5], [0.0, 0.5, 0.5], [1.0, 0.5, 0.5], [1.0, 0.5, 0.5]] };
+const ADDRESS_TABLE: ColorTable<'static> = ColorTable {
+    width: 2,
+    height: 2,
+    texels: &[[0.0, 0.5, 0.5], [0.0, 0.5, 0.5], [1.0, 0.5, 0.5], [1.0, 0.5, 0.5]],
+};
 
 /// More distributions than the 16 that a rig may blend at once.
 fn flushed_dome() -> Head {
@@ -104,7 +107,8 @@ fn neutral_weights_and_static_colour_are_the_neutral_map_bit_for_bit() {
 fn the_last_of_many_wrinkle_maps_shows_as_an_only_one_does() {
     let Some(mut renderer) = renderer() else { return };
     let s = settings([48, 48]);
-    let frown = |head: &Head, weights: &[f32]| FaceState { zones: weights.to_vec(), ..FaceState::neutral(head) };
+    let frown =
+        |head: &Head, weights: &[f32]| FaceState { zones: weights.to_vec(), ..FaceState::neutral(head) };
     let one = dome();
     let mut many = dome();
     let flat = Map::filled(8, 8, &[-0.7, 0.4]);

@@ -118,7 +118,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
     }
     if seen == 0u {
         if params.head == 0u {
-            textureStore(diffuse_out, id.xy, vec4f(0.0));
+            textureStore(diffuse_out, id.xy, vec4f(0.0, 0.0, 0.0, FAR_MM));
             textureStore(albedo_out, id.xy, vec4f(0.0));
             textureStore(direct_out, id.xy, vec4f(0.0));
         }
@@ -143,11 +143,11 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
     }
 
     if surface.scattering > 0.0 {
-        textureStore(diffuse_out, id.xy, vec4f(diffuse, surface.scattering));
-        textureStore(albedo_out, id.xy, vec4f(surface.albedo, 1.0));
+        textureStore(diffuse_out, id.xy, vec4f(diffuse, relative_depth_mm(view, textureLoad(depth, id.xy, 0))));
+        textureStore(albedo_out, id.xy, vec4f(surface.albedo, surface.scattering));
         textureStore(direct_out, id.xy, vec4f(specular, 1.0));
     } else {
-        textureStore(diffuse_out, id.xy, vec4f(0.0));
+        textureStore(diffuse_out, id.xy, vec4f(0.0, 0.0, 0.0, FAR_MM));
         textureStore(albedo_out, id.xy, vec4f(0.0));
         textureStore(direct_out, id.xy, vec4f(diffuse * surface.albedo + specular, 1.0));
     }
