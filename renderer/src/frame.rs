@@ -15,6 +15,7 @@ use crate::passes::appearance::{Appearance, Blended};
 use crate::passes::compose::Compose;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
+use crate::passes::cropped_hair::CroppedHair;
 use crate::passes::overlay::Overlay;
 use crate::passes::scatter::surface::{self, Skin, Surface};
 use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
@@ -105,6 +106,7 @@ pub struct Renderer {
     shade: Shade,
     scatter: Scatter,
     compose: Compose,
+    cropped_hair: CroppedHair,
     overlay: Overlay,
     display: Display,
     velocity: Velocity,
@@ -157,6 +159,7 @@ impl Renderer {
             shade: Shade::new(&gpu),
             scatter: Scatter::default(),
             compose: Compose::new(&gpu),
+            cropped_hair: CroppedHair::new(&gpu),
             overlay: Overlay::new(&gpu),
             display: Display::new(&gpu),
             velocity: Velocity::new(&gpu),
@@ -387,7 +390,7 @@ impl Renderer {
             }
             let numbers = [&head.state.shapes, &head.state.zones, &head.state.distributions];
             if numbers.iter().any(|n| n.iter().any(|w| !w.is_finite()))
-                || !head.state.hemoglobin_scale.is_finite()
+                || !(head.state.hemoglobin_scale + head.state.pupil_mm).is_finite()
             {
                 return limit("face state", "a weight that is not finite".into(), "finite weights".into());
             }
@@ -516,13 +519,22 @@ impl Renderer {
 
             let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
             self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
+            let ambient = average_light(scene);
+            let haired: Vec<_> = heads
+                .iter()
+                .filter(|(h, _)| h.hair_root_count > 0)
+                .map(|(h, i)| (*h, &i.positions, &i.frames))
+                .collect();
+            if !haired.is_empty() {
+                let images = [&targets.irradiance, &sample.depth, &targets.hdr];
+                self.cropped_hair.record(gpu, encoder, timer, &view, ambient, &haired, images);
+            }
             let overlays: Vec<_> = heads
                 .iter()
                 .filter(|(h, _)| h.overlay_triangles > 0)
                 .map(|(h, i)| (*h, &i.positions, &i.frames))
                 .collect();
             if !overlays.is_empty() {
-                let ambient = average_light(scene);
                 let images = [&sample.depth, &targets.hdr];
                 self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
             }
@@ -654,6 +666,7 @@ fn shaded<'a>(
         frames: &buffers.frames,
         blended: &buffers.blended,
         hemoglobin_scale: instance.state.hemoglobin_scale,
+        pupil_mm: instance.state.pupil_mm,
     }
 }
 

@@ -85,7 +85,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             hemoglobin_scale as "hemoglobin_scale", head as "head",
             environment_intensity as "environment_intensity", environment_levels as "environment_levels",
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", transmit as "transmit", hair_color as "hair_color",
-            is_second_sample as "is_second_sample", harmonics as "harmonics", lights as "lights"),
+            is_second_sample as "is_second_sample", pupil_mm as "pupil_mm", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
         overlay::SHADER,

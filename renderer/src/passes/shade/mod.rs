@@ -125,7 +125,8 @@ pub(crate) struct Params {
     pub(crate) transmit: [f32; 4],
     pub(crate) hair_color: [f32; 4],
     pub(crate) is_second_sample: u32,
-    pub(crate) padding: [u32; 3],
+    pub(crate) pupil_mm: f32,
+    pub(crate) padding: [u32; 2],
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
@@ -210,6 +211,7 @@ pub(crate) struct Shaded<'a> {
     pub(crate) frames: &'a wgpu::Buffer,
     pub(crate) blended: &'a Blended,
     pub(crate) hemoglobin_scale: f32,
+    pub(crate) pupil_mm: f32,
 }
 
 /// The pipeline of the pass.
@@ -399,7 +401,8 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
         has_maps: u32::from(maps.is_some()),
         wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
         is_second_sample: u32::from(lighting.first.is_some()),
-        padding: [0; 3],
+        pupil_mm: shaded.pupil_mm,
+        padding: [0; 2],
         transmit: lighting
             .transmittance
             .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),

@@ -33,7 +33,8 @@ struct Params {
     hair_color: vec4f,
     // 1 where the pixel has a first sample whose light may do for this one.
     is_second_sample: u32,
-    padding_0: u32,
+    // Diameter of the pupils, millimetres.
+    pupil_mm: f32,
     padding_1: u32,
     padding_2: u32,
     // Real spherical harmonics of the environment's irradiance / pi, rgb.
@@ -237,7 +238,8 @@ fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f
             surface.albedo = vec3f(0.30, 0.085, 0.078);
             surface.specular = 0.5;
             surface.roughness = 0.22;
-            surface.occlusion *= surface.occlusion * surface.occlusion;
+            // Deep, but never black: red light is passed on from wall to wall.
+            surface.occlusion = max(surface.occlusion * surface.occlusion * surface.occlusion, 0.10);
         }
         default: {
             surface.albedo = vec3f(0.2);
@@ -251,6 +253,10 @@ fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f
     return surface;
 }
 
+// Pixels that relief is averaged over: a highlight answers slopes so steeply that one pixel's mean still glitters
+// (Kaplanyan et al. 2016 take a Gaussian of half a pixel's deviation, about this wide).
+const RELIEF_FOOTPRINT = 1.6;
+
 // Wrinkles: papers/004 section 8.2, slopes add up. Hemoglobin: section 7.4.2, written as the neutral value plus
 // changes so that neutral weights give the neutral map exactly. Colour: section 7.6.
 fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f, tangent: vec3f, bitangent: vec3f) {
@@ -262,7 +268,7 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
         return;
     }
     let map = textureSampleGrad(skin_map, trilinear_repeat, uv, duv_dx, duv_dy);
-    let fine = textureSampleGrad(slope_map, trilinear_repeat, uv, duv_dx, duv_dy);
+    let fine = textureSampleGrad(slope_map, trilinear_repeat, uv, RELIEF_FOOTPRINT * duv_dx, RELIEF_FOOTPRINT * duv_dy);
     var slopes = params.slope_scale * fine.xy;
     let weights = textureSampleLevel(wrinkle_weights, linear_clamp, uv, 0.0);
     for (var i = 0u; i < params.wrinkle_map_count; i++) {
@@ -271,7 +277,9 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
                 * textureSampleGrad(wrinkle_maps, trilinear_repeat, uv, i, duv_dx, duv_dy).xy;
         }
     }
-    let micro = micro_relief(uv, duv_dx, duv_dy);
+    let gloss = textureSampleGrad(gloss_map, trilinear_repeat, uv, duv_dx, duv_dy);
+    // Lips have lines of their own and no net of furrows; they are what shines most.
+    let micro = micro_relief(uv, duv_dx, duv_dy) * smoothstep(0.60, 0.53, gloss.r);
     slopes += params.slope_scale * micro.xy;
     (*surface).normal =
         normalize((*surface).smooth_normal + slopes.x * tangent + slopes.y * bitangent);
@@ -287,7 +295,6 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
 
     (*surface).albedo = mix((*surface).albedo, params.hair_color.rgb, map.a);
 
-    let gloss = textureSampleGrad(gloss_map, trilinear_repeat, uv, duv_dx, duv_dy);
     (*surface).specular = gloss.r;
     // Slope variance that the mip level hides is roughness (Toksvig 2005; for Beckmann m^2 = 2 sigma^2).
     let variance = square(params.slope_scale) * (fine.z + micro.z);
