@@ -43,6 +43,9 @@ pub struct FacialAppearance {
     /// The rig file, as it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<serde_json::Value>,
+    /// The sequence file that the animation was made from, as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<serde_json::Value>,
 }
 
 /// A part of the mesh.

@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::Vec3;
 use rubor_assets::facial_appearance::{FacialAppearance, MapEntries};
 use rubor_assets::import::gltf::{from_bytes, read};
+use rubor_rig::timeline::{Ease, Sequence, Track};
 use serde_json::{Value, json};
 
 /// Two triangles that share an edge (the second with other texture coordinates), one named sparse target, a node that
@@ -104,6 +105,311 @@ fn broken_documents_are_errors_with_a_place() {
     assert!(read(Path::new("/nowhere.glb")).is_err());
 }
 
+/// A document whose buffer is made piece by piece.
+#[derive(Default)]
+struct Pieces {
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+}
+
+impl Pieces {
+    fn view(&mut self, bytes: &[u8], stride: Option<usize>) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let mut view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
+        if let Some(stride) = stride {
+            view["byteStride"] = json!(stride);
+        }
+        self.bytes.extend_from_slice(bytes);
+        self.views.push(view);
+        self.views.len() - 1
+    }
+
+    fn accessor(&mut self, accessor: Value) -> usize {
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
+
+    fn floats(&mut self, values: &[f32], kind: &str) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let width = match kind {
+            "SCALAR" => 1,
+            "VEC2" => 2,
+            "VEC3" => 3,
+            "VEC4" => 4,
+            _ => 16,
+        };
+        let view = self.view(&bytes, None);
+        let low = values[..width].to_vec();
+        self.accessor(json!({"bufferView": view, "componentType": 5126, "count": values.len() / width,
+            "type": kind, "min": low, "max": low}))
+    }
+
+    fn finish(self, mut document: Value) -> Value {
+        document["asset"] = json!({"version": "2.0"});
+        document["buffers"] = json!([{"byteLength": self.bytes.len(),
+            "uri": format!("data:application/octet-stream;base64,{}", base64(&self.bytes))}]);
+        document["bufferViews"] = Value::Array(self.views);
+        document["accessors"] = Value::Array(self.accessors);
+        document
+    }
+}
+
+const TRIANGLE: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+#[test]
+fn quantised_and_strided_accessors_are_scaled_back() {
+    let mut pieces = Pieces::default();
+    // Shorts with a stride of 8 bytes, normalized: 32767 is 1.
+    let shorts: Vec<u8> = [[0_i16, 0, 0, 9], [32767, 0, 0, 9], [0, -32768, 16384, 9]]
+        .as_flattened()
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
+    let view = pieces.view(&shorts, Some(8));
+    let position = pieces
+        .accessor(json!({"bufferView": view, "componentType": 5122, "normalized": true, "count": 3,
+        "type": "VEC3", "min": [0, -1, 0], "max": [1, 0, 0.5]}));
+    let bytes: Vec<u8> =
+        [[0_i8, 0, 0, 0], [127, 0, 0, 0], [0, -127, 64, 0]].as_flattened().iter().map(|v| *v as u8).collect();
+    let view = pieces.view(&bytes, Some(4));
+    let target = pieces
+        .accessor(json!({"bufferView": view, "componentType": 5120, "normalized": true, "count": 3,
+        "type": "VEC3", "min": [0, -1, 0], "max": [1, 0, 0.6]}));
+    let bytes = pieces.view(&[0, 0, 0, 0, 255, 0, 0, 0, 0, 255, 0, 0], Some(4));
+    let uv = pieces.accessor(
+        json!({"bufferView": bytes, "componentType": 5121, "normalized": true, "count": 3, "type": "VEC2"}),
+    );
+    let document = pieces.finish(json!({
+        "extensionsUsed": ["KHR_mesh_quantization"], "extensionsRequired": ["KHR_mesh_quantization"],
+        "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": position, "TEXCOORD_0": uv},
+            "targets": [{"POSITION": target}]}]}],
+    }));
+    let head = import(&document).unwrap();
+    assert_eq!(head.mesh.points[1], Vec3::X);
+    // -32768 is cut at -1, as the formula of the specification says.
+    assert_eq!(head.mesh.points[2], Vec3::new(0.0, -1.0, 16384.0 / 32767.0));
+    assert_eq!(head.shapes[0].offsets[1], Vec3::new(0.0, -1.0, 64.0 / 127.0));
+    assert_eq!(head.mesh.vertices[2].uv, glam::Vec2::Y);
+}
+
+#[test]
+fn morph_normals_tangents_and_colours_are_allowed_and_accessors_without_data_are_zeros() {
+    let mut pieces = Pieces::default();
+    let position = pieces.floats(&TRIANGLE, "VEC3");
+    let up = pieces.floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "VEC3");
+    let turned = pieces.floats(&[0.1; 9], "VEC3");
+    let colour = pieces.floats(&[0.5; 12], "VEC4");
+    let zeros = pieces.accessor(json!({"componentType": 5126, "count": 3, "type": "VEC3"}));
+    let document = pieces.finish(json!({
+        "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"extras": {"targetNames": ["up", "none"]}, "primitives": [{
+            "attributes": {"POSITION": position, "COLOR_0": colour},
+            "targets": [{"POSITION": up, "NORMAL": turned, "TANGENT": turned, "COLOR_0": colour},
+                        {"POSITION": zeros, "NORMAL": zeros}],
+        }]}],
+    }));
+    let head = import(&document).unwrap();
+    assert_eq!(
+        head.shapes.iter().map(|s| (&s.name[..], s.points.len())).collect::<Vec<_>>(),
+        [("up", 1), ("none", 0)]
+    );
+}
+
+#[test]
+fn several_meshes_share_shapes_by_name_along_the_nodes() {
+    let mut pieces = Pieces::default();
+    let position = pieces.floats(&TRIANGLE, "VEC3");
+    let up = pieces.floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "VEC3");
+    let mesh = |names: Value| {
+        json!({"extras": {"targetNames": names}, "primitives": [
+            {"attributes": {"POSITION": position}, "targets": [{"POSITION": up}, {"POSITION": up}]},
+            {"attributes": {"POSITION": position}, "targets": [{"POSITION": up}, {"POSITION": up}], "material": 0},
+        ]})
+    };
+    let document = pieces.finish(json!({
+        "scenes": [{"nodes": [0, 2]}],
+        "nodes": [{"children": [1], "translation": [0, 0, 5]}, {"mesh": 0, "rotation": [0, 1, 0, 0]}, {"mesh": 1}],
+        "materials": [{"name": "teeth"}],
+        "meshes": [mesh(json!(["a", "b"])), mesh(json!(["b", "c"]))],
+    }));
+    let head = import(&document).unwrap();
+    assert_eq!(head.mesh.parts.len(), 4);
+    assert_eq!(head.mesh.parts[1].material, rubor_rig::head::Material::Teeth);
+    let moved: Vec<(&str, usize)> = head.shapes.iter().map(|s| (&s.name[..], s.points.len())).collect();
+    // The primitives of one mesh weld where they agree.
+    assert_eq!(moved, [("a", 1), ("b", 2), ("c", 1)]);
+    // Half a turn about y, then 5 m along z.
+    assert!(head.mesh.points.iter().any(|p| p.abs_diff_eq(Vec3::new(-1.0, 0.0, 5.0), 1e-6)));
+    assert!(head.shapes[0].offsets[0].abs_diff_eq(-Vec3::Z, 1e-6));
+}
+
+#[test]
+fn skinned_meshes_stand_in_the_rest_pose_of_their_joints() {
+    let mut pieces = Pieces::default();
+    let position = pieces.floats(&TRIANGLE, "VEC3");
+    let joints = pieces.view(&[0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0], None);
+    let joints =
+        pieces.accessor(json!({"bufferView": joints, "componentType": 5121, "count": 3, "type": "VEC4"}));
+    let weights = pieces.floats(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.0], "VEC4");
+    let document = |root: f32| {
+        let mut pieces = Pieces {
+            bytes: pieces.bytes.clone(),
+            views: pieces.views.clone(),
+            accessors: pieces.accessors.clone(),
+        };
+        let identity = glam::Mat4::IDENTITY.to_cols_array();
+        let back = glam::Mat4::from_translation(-Vec3::Z).to_cols_array();
+        let inverse = pieces.floats(&[identity, back].concat(), "MAT4");
+        pieces.finish(json!({
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"children": [1, 2], "translation": [root, 0, 0]}, {"translation": [0, 0, 1]},
+                      {"mesh": 0, "skin": 0, "scale": [9, 9, 9]}],
+            "skins": [{"joints": [0, 1], "inverseBindMatrices": inverse}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": position, "JOINTS_0": joints, "WEIGHTS_0": weights}}]}],
+        }))
+    };
+    let head = import(&document(0.0)).unwrap();
+    assert_eq!(head.mesh.points, [Vec3::ZERO, Vec3::X, Vec3::Y], "the node's own transform does not count");
+    let head = import(&document(2.0)).unwrap();
+    assert_eq!(head.mesh.points[1], Vec3::new(3.0, 0.0, 0.0), "joints carry it");
+}
+
+#[test]
+fn what_is_compressed_or_unknown_is_refused_in_words() {
+    for (extension, words) in [
+        ("KHR_draco_mesh_compression", "without Draco compression"),
+        ("EXT_meshopt_compression", "without meshopt compression"),
+        ("ACME_blobs", "ACME_blobs"),
+    ] {
+        let mut d = document();
+        d["extensionsUsed"] = json!([extension]);
+        d["extensionsRequired"] = json!([extension]);
+        let error = import(&d).unwrap_err();
+        assert!(error.contains(words) && error.contains("extensionsRequired 0"), "{error}");
+    }
+    let mut d = document();
+    d["extensionsUsed"] = json!(["KHR_materials_clearcoat"]);
+    d["extensionsRequired"] = json!(["KHR_materials_clearcoat"]);
+    assert!(import(&d).is_ok(), "a material changes no geometry");
+}
+
+#[test]
+fn trees_that_are_too_deep_are_refused() {
+    let mut d = document();
+    let nodes: Vec<Value> =
+        (0..100_000).map(|i| json!({"children": [i + 1]})).chain([json!({"mesh": 0})]).collect();
+    d["nodes"] = Value::Array(nodes);
+    let error = import(&d).unwrap_err();
+    assert!(error.contains("512 levels"), "{error}");
+}
+
+#[test]
+fn external_files_are_read_from_the_folder_only() {
+    let folder = std::env::temp_dir().join(format!("rubor-gltf-{}", std::process::id()));
+    let inner = folder.join("in");
+    std::fs::create_dir_all(inner.join("bin")).unwrap();
+    std::fs::write(folder.join("secret.bin"), data()).unwrap();
+    std::fs::write(inner.join("bin/data file.bin"), data()).unwrap();
+    let read_with = |uri: &str| {
+        let mut d = document();
+        d["buffers"][0]["uri"] = json!(uri);
+        let path = inner.join("head.gltf");
+        std::fs::write(&path, d.to_string()).unwrap();
+        read(&path).map_err(|e| e.to_string())
+    };
+    assert_eq!(read_with("bin/data%20file.bin").unwrap().head.mesh.points.len(), 4);
+    for uri in
+        ["../secret.bin", "bin/../../secret.bin", "%2e%2e/secret.bin", "file:///etc/passwd", "//host/x"]
+    {
+        let error = read_with(uri).unwrap_err();
+        assert!(error.contains("in the folder of the document"), "{uri}: {error}");
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(folder.join("secret.bin"), inner.join("link.bin")).unwrap();
+        assert!(read_with("link.bin").unwrap_err().contains("in the folder of the document"));
+    }
+    assert!(read_with("missing.bin").unwrap_err().contains("missing.bin"));
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn animations_of_others_become_tracks() {
+    let animated = |interpolation: &str, weights: &[f32]| {
+        let mut pieces = Pieces::default();
+        let position = pieces.floats(&TRIANGLE, "VEC3");
+        let up = pieces.floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "VEC3");
+        let times = pieces.floats(&[0.0, 0.5, 1.0], "SCALAR");
+        let weights = pieces.floats(weights, "SCALAR");
+        let half = std::f32::consts::FRAC_1_SQRT_2;
+        let turn = pieces.floats(&[0.0, 0.0, 0.0, 1.0, 0.0, half, 0.0, half, 0.0, 0.0, 0.0, 1.0], "VEC4");
+        let document = pieces.finish(json!({
+            "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "translation": [0, 1, 0]}],
+            "meshes": [{"extras": {"targetNames": ["jawOpen", "still"]},
+                "primitives": [{"attributes": {"POSITION": position}, "targets": [{"POSITION": up}, {"POSITION": up}]}]}],
+            "animations": [{"name": "take", "samplers": [
+                {"input": times, "output": weights, "interpolation": interpolation},
+                {"input": times, "output": turn}],
+                "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}},
+                             {"sampler": 1, "target": {"node": 0, "path": "rotation"}}]}],
+        }));
+        from_bytes(document.to_string().as_bytes(), Path::new("t.gltf"))
+            .map(|i| i.animation.unwrap())
+            .map_err(|e| e.to_string())
+    };
+    let keys = |s: &Sequence| match &s.shapes["jawOpen"] {
+        Track::Keys(keys) => keys.iter().map(|k| (k.t, k.v, k.ease)).collect::<Vec<_>>(),
+        Track::Constant(_) => panic!("a constant"),
+    };
+    let linear = animated("LINEAR", &[0.0, 0.0, 1.0, 0.0, 0.5, 0.0]).unwrap();
+    assert_eq!(keys(&linear), [(0.0, 0.0, Ease::Linear), (0.5, 1.0, Ease::Linear), (1.0, 0.5, Ease::Linear)]);
+    assert_eq!((linear.fps, linear.duration, &linear.description[..]), (24.0, 1.0, "take"));
+    assert!(!linear.shapes.contains_key("still"));
+    assert!((linear.head.yaw_degrees.at(0.5) - 90.0).abs() < 1e-3);
+    let step = animated("STEP", &[0.0, 0.0, 1.0, 0.0, 0.5, 0.0]).unwrap();
+    assert_eq!(step.shapes["jawOpen"].at(0.49), 0.0);
+    // Slope in, value, slope out of both targets at each key: flat ends are a smooth easing.
+    let flat = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0];
+    let cubic = animated("CUBICSPLINE", &flat).unwrap();
+    assert_eq!(keys(&cubic)[0].2, Ease::Smooth);
+    assert_eq!(cubic.shapes["jawOpen"].at(0.25), 0.5);
+    let error = animated("LINEAR", &[0.0; 5]).unwrap_err();
+    assert!(error.contains("animation 0, channel 0") && error.contains("5 numbers"), "{error}");
+}
+
+/// Our own animation read as somebody else's: weights at any time, whatever the easings were.
+#[test]
+fn an_exported_animation_is_the_performance() {
+    let text = r#"{"fps": 24, "duration": 2, "shapes": {
+        "up": [{"t": 0, "v": 0, "ease": "smooth"}, {"t": 0.5, "v": 1, "ease": "easeIn"}, {"t": 1, "v": 0.25, "ease": "step"}, {"t": 1.5, "v": 0.75}],
+        "side": [{"t": 0.25, "v": 0.1, "ease": "smoother"}, {"t": 1.75, "v": 0.9, "ease": "easeInOut"}, {"t": 2, "v": 0}]},
+        "head": {"yawDegrees": [{"t": 0, "v": 0, "ease": "smooth"}, {"t": 2, "v": 40}], "translation": [0.01, 0, 0]}}"#;
+    let sequence = Sequence::from_json("s.json", text).unwrap();
+    let mut head = import(&document()).unwrap();
+    let up = head.shapes[0].clone();
+    head.shapes.push(rubor_rig::head::BlendShape { name: "side".into(), ..up });
+    let rig = rubor_rig::expression::Rig::default();
+    let options = rubor_assets::export::gltf::Options {
+        rig: Some(&rig),
+        sequence: Some(&sequence),
+        ..rubor_assets::export::gltf::Options::default()
+    };
+    let bytes = rubor_assets::export::gltf::to_bytes(&head, &options).unwrap();
+    let read = from_bytes(&bytes, Path::new("t.glb")).unwrap().animation.unwrap();
+    for frame in 0..read.frame_count() {
+        let t = read.frame_time_s(frame);
+        for name in ["up", "side"] {
+            let (a, b) = (sequence.shapes[name].at(t), read.shapes[name].at(t));
+            assert!((a - b).abs() < 2e-5, "{name} at {t}: {a} and {b}");
+        }
+        let (a, b) = (sequence.head.yaw_degrees.at(t), read.head.yaw_degrees.at(t));
+        assert!((a - b).abs() < 2e-3, "yaw at {t}: {a} and {b}");
+    }
+    assert!((read.head.translation.at(1.0)[0] - 0.01).abs() < 1e-6);
+}
+
 #[test]
 fn published_samples_are_read() {
     let Ok(shared) = std::env::var("RUBOR_SHARED") else {
@@ -148,7 +454,7 @@ fn the_published_schema_names_the_properties() {
     let provenance = json!({"of": "geometry", "kind": "measured", "source": "s", "licence": "MIT"});
     let whole = json!({
         "version": 1, "name": "n", "mesh": 0, "pointCount": 3, "parts": [part], "occlusion": 2,
-        "landmarks": {"a": [0.0, 0.0, 0.0]}, "maps": maps, "provenance": [provenance], "rig": {},
+        "landmarks": {"a": [0.0, 0.0, 0.0]}, "maps": maps, "provenance": [provenance], "rig": {}, "sequence": {},
     });
     let written = |v: Value| -> Value {
         let parsed: FacialAppearance = serde_json::from_value(v).unwrap();

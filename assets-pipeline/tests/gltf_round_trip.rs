@@ -1,15 +1,19 @@
 //! A head written as `.glb` and read again is the same head.
 
 use std::path::Path;
+use std::sync::OnceLock;
 
-use glam::{Quat, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rubor_assets::error::{ExportError, ImportError};
-use rubor_assets::export::gltf::{Frame, MapEncoding, MapEncodings, Options, to_bytes};
+use rubor_assets::export::gltf::{MapEncoding, MapEncodings, Options, export, to_bytes};
+use rubor_assets::export::{TextureFormat, top_shapes};
 use rubor_assets::import::gltf::from_bytes;
+use rubor_rig::expression::Rig;
 use rubor_rig::head::{
     BlendShape, Distribution, Head, Material, Mesh, Part, Provenance, ProvenanceKind, Vertex, WrinkleZone,
 };
 use rubor_rig::map::Map;
+use rubor_rig::timeline::Sequence;
 
 /// A bumpy grid of 21 x 21 points with a texture seam in the middle column, and a second part above it.
 fn head() -> Head {
@@ -95,8 +99,19 @@ fn head() -> Head {
     head
 }
 
-fn options() -> Options {
-    Options { rig: Some(serde_json::json!({"expressions": {"joy": {}}})), ..Options::default() }
+/// A rig whose one expression moves two shapes and colours the face.
+fn rig() -> &'static Rig {
+    static RIG: OnceLock<Rig> = OnceLock::new();
+    RIG.get_or_init(|| {
+        let text = r#"{"expressions": {"joy": {
+            "shapes": {"few": 1, "all": 0.5}, "hemoglobin": {"joy": 1}, "wrinkles": {"zone-4": 1}
+        }}}"#;
+        Rig::from_json("rig.json", text).unwrap()
+    })
+}
+
+fn options() -> Options<'static> {
+    Options { rig: Some(rig()), ..Options::default() }
 }
 
 fn assert_maps_equal(a: &Map, b: &Map, levels: f32, what: &str) {
@@ -118,7 +133,7 @@ fn geometry_is_exact_and_maps_are_within_half_a_step() {
     let head = head();
     let bytes = to_bytes(&head, &options()).unwrap();
     let read = from_bytes(&bytes, Path::new("test.glb")).unwrap();
-    assert_eq!(read.rig, options().rig);
+    assert_eq!(read.rig, Some(serde_json::to_value(rig()).unwrap()));
     let read = read.head;
     assert_eq!(read.name, head.name);
     assert_eq!(read.mesh.points, head.mesh.points);
@@ -215,19 +230,122 @@ fn another_version_of_the_extension_is_refused() {
     assert!(matches!(&error, ImportError::Content { found, .. } if found == "version 9"), "{error}");
 }
 
+fn sequence(text: &str) -> Sequence {
+    Sequence::from_json("sequence.json", text).unwrap()
+}
+
+/// The JSON chunk of a GLB.
+fn document(bytes: &[u8]) -> serde_json::Value {
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    serde_json::from_slice(&bytes[20..20 + length]).unwrap()
+}
+
 #[test]
-fn frames_must_fit_the_head() {
+fn a_performance_is_animated_as_it_is_written_and_carried_along() {
     let head = head();
-    let frame = |time_s, count| Frame {
-        time_s,
-        weights: vec![0.0; count],
-        rotation: Quat::IDENTITY,
-        translation: Vec3::ZERO,
-    };
-    let with = |frames| to_bytes(&head, &Options { frames, ..Options::default() });
-    let good = with(vec![frame(0.0, 3), frame(0.5, 3)]).unwrap();
-    assert!(from_bytes(&good, Path::new("animated.glb")).is_ok());
-    for bad in [vec![frame(0.0, 2)], vec![frame(0.5, 3), frame(0.5, 3)], vec![frame(f32::NAN, 3)]] {
-        assert!(matches!(with(bad), Err(ExportError::Content { .. })));
+    for (ease, interpolation) in [("step", "STEP"), ("linear", "LINEAR"), ("smooth", "CUBICSPLINE")] {
+        let sequence = sequence(&format!(
+            r#"{{"fps": 24, "duration": 1, "shapes": {{
+                "few": [{{"t": 0, "v": 0, "ease": "{ease}"}}, {{"t": 0.5, "v": 1, "ease": "{ease}"}}, {{"t": 1, "v": 0.25}}]
+            }}, "head": {{"translation": [{{"t": 0, "v": [0, 0, 0]}}, {{"t": 1, "v": [0, 0.01, 0]}}]}}}}"#
+        ));
+        let bytes = to_bytes(&head, &Options { sequence: Some(&sequence), ..options() }).unwrap();
+        let json = document(&bytes);
+        let animation = &json["animations"][0];
+        let paths: Vec<&str> =
+            (0..2).map(|i| animation["channels"][i]["target"]["path"].as_str().unwrap()).collect();
+        assert_eq!(paths, ["translation", "weights"], "the head does not turn");
+        assert_eq!(animation["samplers"][1]["interpolation"], interpolation);
+        assert_eq!(
+            json["accessors"][animation["samplers"][1]["input"].as_u64().unwrap() as usize]["count"],
+            3
+        );
+        let read = from_bytes(&bytes, Path::new("animated.glb")).unwrap();
+        assert_eq!(read.sequence, Some(serde_json::to_value(&sequence).unwrap()));
+        assert_eq!(read.head.shapes, head.shapes);
     }
+    let unknown = sequence(r#"{"fps": 24, "duration": 1, "expressions": {"fury": 1}}"#);
+    let error = to_bytes(&head, &Options { sequence: Some(&unknown), ..options() }).unwrap_err();
+    assert!(matches!(error, ExportError::Content { .. }) && error.to_string().contains("fury"), "{error}");
+}
+
+#[test]
+fn shapes_carry_the_colour_of_their_expression() {
+    let head = head();
+    let bytes = to_bytes(&head, &Options { shape_colors: true, ..options() }).unwrap();
+    let json = document(&bytes);
+    let skin = &json["meshes"][0]["primitives"][0];
+    assert!(skin["attributes"]["COLOR_0"].is_u64());
+    assert!(skin["targets"].as_array().unwrap().iter().all(|t| t["COLOR_0"].is_u64()));
+    assert!(json["meshes"][0]["primitives"][1]["attributes"]["COLOR_0"].is_null(), "only skin is coloured");
+    // Shares of the expression are as its weights: 1 of "few" and 0.5 of "all" bring the whole colour back.
+    let largest = |target: usize| -> f64 {
+        let accessor = &json["accessors"][skin["targets"][target]["COLOR_0"].as_u64().unwrap() as usize];
+        let numbers = |k: &str| {
+            accessor[k].as_array().unwrap().iter().map(|v| v.as_f64().unwrap().abs()).fold(0.0, f64::max)
+        };
+        numbers("min").max(numbers("max"))
+    };
+    let (few, all, none) = (largest(0), largest(1), largest(2));
+    assert!(few > 0.01 && (all / few - 0.5).abs() < 1e-3 && none == 0.0, "{few} {all} {none}");
+    assert_eq!(from_bytes(&bytes, Path::new("colored.glb")).unwrap().head.shapes, head.shapes);
+}
+
+#[test]
+fn a_pose_bakes_blood_wrinkles_and_weights() {
+    let head = head();
+    let pose = {
+        let sequence = sequence(r#"{"fps": 24, "duration": 1, "expressions": {"joy": 1}}"#);
+        rubor_rig::evaluate::Evaluator::new(&head, rig(), &sequence).unwrap().0.face_at(0.5)
+    };
+    let picture = |bytes: &[u8], name: &str| {
+        let json = document(bytes);
+        let image = json["images"].as_array().unwrap().iter().find(|i| i["name"] == name).unwrap();
+        let view = &json["bufferViews"][image["bufferView"].as_u64().unwrap() as usize];
+        let start = 28
+            + u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize
+            + view["byteOffset"].as_u64().unwrap() as usize;
+        bytes[start..start + view["byteLength"].as_u64().unwrap() as usize].to_vec()
+    };
+    let still = Options { textures: TextureFormat::Png, ..options() };
+    let posed = Options { pose: Some(pose), shape_colors: true, ..still.clone() };
+    let (still, posed) = (to_bytes(&head, &still).unwrap(), to_bytes(&head, &posed).unwrap());
+    for name in ["base colour", "normals"] {
+        assert_ne!(picture(&still, name), picture(&posed, name), "{name}");
+    }
+    assert_eq!(document(&posed)["meshes"][0]["weights"], serde_json::json!([1.0, 0.5, 0.0]));
+    assert!(document(&posed)["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"].is_null());
+}
+
+#[test]
+fn pictures_are_stored_as_asked() {
+    let head = head();
+    for format in [TextureFormat::Png, TextureFormat::Jpeg, TextureFormat::Webp] {
+        let bytes = to_bytes(&head, &Options { textures: format, ..options() }).unwrap();
+        let json = document(&bytes);
+        let base = json["images"].as_array().unwrap().iter().find(|i| i["name"] == "base colour").unwrap();
+        let mime = ["image/png", "image/jpeg", "image/webp"][[
+            TextureFormat::Png,
+            TextureFormat::Jpeg,
+            TextureFormat::Webp,
+        ]
+        .iter()
+        .position(|f| *f == format)
+        .unwrap()];
+        assert_eq!(base["mimeType"], mime);
+        assert_eq!(json["extensionsRequired"].is_array(), format == TextureFormat::Webp);
+        let read = from_bytes(&bytes, Path::new("pictures.glb")).unwrap();
+        assert_eq!(read.head.mesh.points, head.mesh.points);
+    }
+}
+
+#[test]
+fn the_strongest_shapes_are_kept() {
+    let head = head();
+    let kept = top_shapes(&head, None, 1).unwrap();
+    assert_eq!(kept, [1], "the shape that moves all points furthest");
+    let exported = export(&head, &Options { shapes: Some(kept), ..options() }).unwrap();
+    let read = from_bytes(&exported.bytes, Path::new("top.glb")).unwrap().head;
+    assert_eq!(read.shapes, [head.shapes[1].clone()]);
+    assert!(export(&head, &Options { shapes: Some(vec![3]), ..options() }).is_err());
 }

@@ -8,10 +8,10 @@ use rubor_assets::export::gltf::MapEncodings;
 use rubor_assets::{export, import, synthesize};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
+use rubor_rig::timeline::Sequence;
 
 use crate::failure::{Failure, Outcome};
 use crate::progress::Progress;
-use crate::sequence_job::neutral_color;
 
 #[derive(clap::Args)]
 #[group(skip)]
@@ -25,6 +25,9 @@ pub(crate) struct Arguments {
     /// Unit of length of OBJ files
     #[arg(long, value_enum, default_value = "cm")]
     units: Units,
+    /// Also write the animation of a .glb or .gltf file (.json)
+    #[arg(long, value_name = "FILE")]
+    sequence: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
@@ -126,6 +129,9 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             let Some(source) = &arguments.source else {
                 return Err(Failure::input("expected a folder of OBJ files, a .glb or a .gltf file"));
             };
+            if source.is_dir() && arguments.sequence.is_some() {
+                return Err(Failure::input("--sequence: a folder of OBJ files has no animation"));
+            }
             let head = if source.is_dir() {
                 let mut options = import::obj_set::Options {
                     folder: source.clone(),
@@ -135,7 +141,15 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
                 options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
                 import::obj_set::import(&options)?
             } else {
-                crate::inputs::head(Some(source))?.head
+                let loaded = crate::inputs::head(Some(source))?;
+                if let Some(path) = &arguments.sequence {
+                    let found = loaded.sequence.as_ref().or(loaded.animation.as_ref());
+                    write_sequence(found, source, path)?;
+                }
+                if let Some(rig) = &loaded.rig {
+                    return finish_with(loaded.head, rig, synthesize::Options::default(), &arguments.common);
+                }
+                loaded.head
             };
             finish(head, synthesize::Options::default(), &arguments.common)
         }
@@ -188,6 +202,17 @@ pub(crate) fn character(character: &import::makehuman::Character, data: &Path, o
     finish(import::makehuman::import(&options)?, character.skin(), &common)
 }
 
+/// Writes the sequence that a file carries, or what was keyed in it.
+fn write_sequence(sequence: Option<&Sequence>, source: &Path, path: &Path) -> Outcome {
+    let Some(sequence) = sequence else {
+        let found = format!("{}: found no animation, expected one for --sequence", source.display());
+        return Err(Failure::input(found));
+    };
+    crate::output::write(path, &serde_json::to_vec_pretty(sequence).map_err(Failure::job)?)?;
+    println!("{}: {} frames at {} a second", path.display(), sequence.frame_count(), sequence.fps);
+    Ok(())
+}
+
 /// Adds maps where there are none and writes the head with the default rig.
 fn finish(head: Head, options: synthesize::Options, common: &Common) -> Outcome {
     finish_with(head, &Rig::default_rig()?, options, common)
@@ -213,9 +238,8 @@ pub(crate) fn finish_with(
         synthesize::synthesize_into_with(&mut head, &options, &step).map_err(Failure::input)?;
         progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
     }
-    let rig = serde_json::to_value(rig).map_err(Failure::job)?;
     let options = export::gltf::Options {
-        base_color: neutral_color(&head, if common.small { 1024 } else { 2048 }),
+        color_map_size: if common.small { 1024 } else { 2048 },
         rig: Some(rig),
         morph_normals: !common.small,
         maps: if common.small { MapEncodings::small() } else { MapEncodings::default() },

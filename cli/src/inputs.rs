@@ -17,6 +17,10 @@ const DEFAULT_HEAD: &[u8] = include_bytes!("../../assets/head.glb");
 pub(crate) struct LoadedHead {
     pub(crate) head: Head,
     pub(crate) rig: Option<Rig>,
+    /// The sequence that its animation was made from.
+    pub(crate) sequence: Option<Sequence>,
+    /// What its animation holds.
+    pub(crate) animation: Option<Sequence>,
     /// Changes with any byte of the file.
     pub(crate) fingerprint: u64,
 }
@@ -40,7 +44,20 @@ pub(crate) fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
             Some(Rig::from_json(&at, &value.to_string())?)
         }
     };
-    Ok(LoadedHead { head: imported.head, rig, fingerprint: fingerprint(&bytes) })
+    let sequence = match imported.sequence {
+        None => None,
+        Some(value) => {
+            let at = format!("{} (sequence)", name.display());
+            Some(Sequence::from_json(&at, &value.to_string())?)
+        }
+    };
+    Ok(LoadedHead {
+        head: imported.head,
+        rig,
+        sequence,
+        animation: imported.animation,
+        fingerprint: fingerprint(&bytes),
+    })
 }
 
 /// FNV-1a: the same on every machine and in every version.

@@ -13,14 +13,17 @@ mod antialias_method;
 mod bench;
 mod capture;
 mod chart;
+mod check;
 mod compare;
 mod contact_sheet;
 mod demo;
+mod export;
 mod failure;
 mod filter;
 mod gallery;
 mod import;
 mod inputs;
+mod inset;
 mod kernel;
 mod maps;
 mod maya;
@@ -53,6 +56,10 @@ enum Command {
     Gallery(gallery::Arguments),
     /// Make a head from other files
     Import(import::Arguments),
+    /// Write an animated head for other programs: .glb, .usda
+    Export(export::Arguments),
+    /// Tell what is wrong with files, what has no effect, and why a wrinkle does not show
+    Check(check::Arguments),
     /// Make the maps of a head: hemoglobin, chromophores, normals, transfer
     Maps(maps::MapsArgs),
     /// Maya ASCII scenes in and out
@@ -81,8 +88,10 @@ fn main() -> ExitCode {
         Command::Render(a) => render::run(&a),
         Command::Gallery(a) => gallery::run(&a),
         Command::Import(a) => import::run(&a),
+        Command::Export(a) => export::run(&a),
+        Command::Check(a) => check::run(&a),
         Command::Maya(a) => maya::run(&a),
-        Command::Maps(a) => maps::run(&a).map_err(failure::Failure::input),
+        Command::Maps(a) => maps::run(&a),
         Command::Filter(a) => filter::run(&a),
         Command::Compare(a) => compare::run(&a),
         Command::Chart(a) => chart::run(&a),

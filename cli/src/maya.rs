@@ -9,7 +9,6 @@ use rubor_rig::expression::Rig;
 
 use crate::failure::{Failure, Outcome};
 use crate::import::{Common, finish_with};
-use crate::sequence_job::neutral_color;
 use crate::{inputs, output};
 
 #[derive(clap::Args)]
@@ -102,8 +101,17 @@ fn import(arguments: &Import) -> Outcome {
         output::write(path, &serde_json::to_vec_pretty(sequence).map_err(Failure::job)?)?;
         println!("{}: {} frames at {} a second", path.display(), sequence.frame_count(), sequence.fps);
     }
-    let mut rig = Rig::default_rig()?;
-    rig.inbetweens.extend(imported.inbetweens);
+    let mut rig = match &imported.rig {
+        Some(value) => Rig::from_json(&format!("{} (rig)", arguments.scene.display()), &value.to_string())?,
+        None => Rig::default_rig()?,
+    };
+    for inbetween in imported.inbetweens {
+        let same =
+            |i: &rubor_rig::expression::Inbetween| i.shape == inbetween.shape && i.target == inbetween.target;
+        if !rig.inbetweens.iter().any(same) {
+            rig.inbetweens.push(inbetween);
+        }
+    }
     finish_with(imported.head, &rig, rubor_assets::synthesize::Options::default(), &arguments.common)
 }
 
@@ -116,12 +124,13 @@ fn export(arguments: &Export) -> Outcome {
         None => None,
     };
     let options = write::Options {
-        base_color: neutral_color(&loaded.head, 2048),
+        base_color: rubor_assets::export::skin_color::bake(&loaded.head, None, 2048, 1.0),
         // Only those of which the head has both ends.
         inbetweens: (rig.inbetweens.iter())
             .filter(|i| [&i.shape, &i.target].iter().all(|n| loaded.head.shape_index(n).is_some()))
             .cloned()
             .collect(),
+        rig: Some(rig.clone()),
     };
     let performance = sequence.as_ref().map(|sequence| Performance { rig: &rig, sequence });
     for note in write::write(&loaded.head, performance, &options, &arguments.output)? {

@@ -12,11 +12,12 @@ use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::export;
-use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, TransmitMethod};
+use rubor_renderer::{
+    AppearanceMethods, ColorMethod, Gpu, Image, Renderer, ScatterMethod, TransmitMethod, WrinkleMethod,
+};
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
-use rubor_rig::head::{Head, Material};
-use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
+use rubor_rig::head::Head;
 use rubor_rig::timeline::Sequence;
 use serde_json::json;
 
@@ -26,7 +27,7 @@ use crate::inputs::LoadedHead;
 use crate::progress::Progress;
 use crate::studio::{self, Studio};
 use crate::video::Video;
-use crate::{contact_sheet, output, video};
+use crate::{contact_sheet, inset, output, video};
 
 /// What `render` and `demo` have in common.
 #[derive(Clone, clap::Args)]
@@ -48,6 +49,15 @@ pub(crate) struct Arguments {
     /// Light through thin parts: none or shadow-depth
     #[arg(long, default_value = "shadow-depth", value_name = "METHOD")]
     pub(crate) transmit: TransmitMethod,
+    /// Colour of the skin: hemoglobin (blood moves) or static
+    #[arg(long, default_value = "hemoglobin", value_name = "METHOD")]
+    pub(crate) color: ColorMethod,
+    /// Wrinkles: none, partial-derivative (slopes add) or difference (differences of normals add)
+    #[arg(long, default_value = "partial-derivative", value_name = "METHOD")]
+    pub(crate) wrinkles: WrinkleMethod,
+    /// Draw a map of the moment of the (first) head into a corner: hemoglobin (dark is more) or wrinkles
+    #[arg(long, value_enum, value_name = "MAP")]
+    pub(crate) inset: Option<inset::Map>,
     /// Antialiasing: none, mlaa, smaa-1x, smaa-s2x, smaa-t2x, smaa-4x, or ssaa:N with N x N samples a pixel
     #[arg(long, default_value = "smaa-s2x", value_parser = parse_antialias, value_name = "METHOD")]
     pub(crate) antialias: Antialias,
@@ -116,13 +126,14 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         job.sequence.fps = fps;
     }
     let size = arguments.size.or(job.sequence.size).unwrap_or([640, 640]);
-    let settings = studio::settings(
+    let mut settings = studio::settings(
         size,
         arguments.scatter,
         arguments.transmit,
         arguments.antialias,
         arguments.exposure,
     );
+    settings.appearance = AppearanceMethods { color: arguments.color, wrinkles: arguments.wrinkles };
     let mut evaluators = Vec::new();
     for loaded in &job.heads {
         let (evaluator, notes) = Evaluator::new(&loaded.head, &job.rig, &job.sequence)?;
@@ -141,6 +152,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
     let spacing = heads.iter().map(|h| width(h)).fold(0.0, f32::max) * SPACING;
     let mut studio = Studio::new(renderer, &heads)?;
 
+    let mut inset = arguments.inset.map(|map| inset::Inset::new(map, heads[0])).transpose()?;
     let mut sheet = Vec::new();
     let on_sheet = contact_sheet::choose(frames.len() as u32);
     let mut times = PassTimes::default();
@@ -161,8 +173,12 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
                     studio.render(&shots_of(&evaluators, frame - 1), spacing, &settings)?;
                 }
                 drawn_last = Some(frame);
-                let (image, stats) = studio.render(&shots_of(&evaluators, frame), spacing, &settings)?;
-                let picture = opaque(image);
+                let shots = shots_of(&evaluators, frame);
+                let (image, stats) = studio.render(&shots, spacing, &settings)?;
+                let mut picture = opaque(image);
+                if let (Some(inset), Some(shot)) = (&mut inset, shots.first()) {
+                    inset.draw(&shot.face, settings.appearance, &mut picture);
+                }
                 write_png(&path, &picture)?;
                 first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
                 drawn.push(at.elapsed().as_secs_f64());
@@ -185,7 +201,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         }
     }
     if !arguments.no_export {
-        export_animated(&job, &evaluators, &arguments.output)?;
+        export_animated(&job, &arguments.output)?;
     }
     let gpu = &studio.renderer.gpu().info;
     let stats = json!({
@@ -195,12 +211,15 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         "framesDrawn": drawn.len(),
         "scatter": arguments.scatter.to_string(),
         "transmit": arguments.transmit.to_string(),
+        "color": arguments.color.to_string(),
+        "wrinkles": arguments.wrinkles.to_string(),
         "antialias": arguments.antialias.to_string(),
         "secondsToFirstFrame": first_frame_s,
         "secondsPerFrame": median(&mut drawn),
         "gpuMillisecondsPerPass": times.medians(),
         "triangles": times.triangles,
         "deviceMemoryBytes": times.memory_bytes,
+        "mapTextures": heads.first().map(|h| rubor_renderer::footprint::of_maps(&h.maps)),
     });
     let text = serde_json::to_string_pretty(&stats).map_err(Failure::job)?;
     output::write(&arguments.output.join(STATS_FILE), text.as_bytes())?;
@@ -232,6 +251,9 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
         "size": size,
         "scatter": arguments.scatter.to_string(),
         "transmit": arguments.transmit.to_string(),
+        "color": arguments.color.to_string(),
+        "wrinkles": arguments.wrinkles.to_string(),
+        "inset": arguments.inset.map(|i| format!("{i:?}")),
         "antialias": arguments.antialias.to_string(),
         "exposure": arguments.exposure,
         "program": env!("CARGO_PKG_VERSION"),
@@ -290,46 +312,18 @@ fn shots_of(evaluators: &[Evaluator], frame: u32) -> Vec<Shot> {
     shots
 }
 
-/// Writes the (first) head with its performance as morph weights and node motion.
-fn export_animated(job: &Job, evaluators: &[Evaluator], folder: &Path) -> Outcome {
-    let (Some(loaded), Some(evaluator)) = (job.heads.first(), evaluators.first()) else { return Ok(()) };
-    let frames = (0..evaluator.frame_count())
-        .map(|i| {
-            let shot = evaluator.at(evaluator.frame_time_s(i));
-            export::gltf::Frame {
-                time_s: shot.time_s as f32,
-                weights: shot.face.shapes,
-                rotation: shot.face.head_rotation,
-                translation: shot.face.head_translation,
-            }
-        })
-        .collect();
+/// Writes the (first) head with its performance.
+fn export_animated(job: &Job, folder: &Path) -> Outcome {
+    let Some(loaded) = job.heads.first() else { return Ok(()) };
     let options = export::gltf::Options {
-        base_color: neutral_color(&loaded.head, 2048),
-        rig: Some(serde_json::to_value(&job.rig).map_err(Failure::job)?),
-        frames,
+        rig: Some(&job.rig),
+        sequence: Some(&job.sequence),
+        shape_colors: true,
         ..export::gltf::Options::default()
     };
-    export::gltf::write(&loaded.head, &options, &folder.join(HEAD_FILE)).map_err(Failure::job)
-}
-
-/// The skin of the neutral face as other viewers show it: sRGB, from the chromophore maps, at most
-/// `side` texels wide.
-pub(crate) fn neutral_color(head: &Head, side: u32) -> Option<RgbImage> {
-    let maps = &head.maps;
-    let (melanin, hemoglobin) = (maps.melanin.as_ref()?, maps.hemoglobin.as_ref()?);
-    if !head.mesh.parts.iter().any(|p| p.material == Material::Skin) {
-        return None;
-    }
-    let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
-    let side = melanin.width.max(hemoglobin.width).min(side);
-    Some(RgbImage::from_fn(side, side, |x, y| {
-        let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
-        let skin = lookup.sample(melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));
-        let hair = maps.hair.as_ref().map_or(0.0, |h| h.sample(u, v, 0));
-        let rgb = std::array::from_fn(|c| skin[c] + hair * (maps.hair_color_linear[c] - skin[c]));
-        image::Rgb(rgb.map(|c| (rubor_rig::color::srgb_encode(c) * 255.0).round() as u8))
-    }))
+    // What has no effect on the head was said before the first frame.
+    export::gltf::write(&loaded.head, &options, &folder.join(HEAD_FILE)).map_err(Failure::job)?;
+    Ok(())
 }
 
 /// GPU times over frames.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use glam::{Mat4, Vec3};
 use rubor_renderer::{
-    Camera, ColorTable, Environment, EnvironmentMap, FrameTimes, HeadInstance, HeadOnGpu, Light, LightKind,
-    Renderer, ScatterMethod, Scene, Settings, TransmitMethod, antialias,
+    AppearanceMethods, Camera, ColorTable, Environment, EnvironmentMap, FrameTimes, HeadInstance, HeadOnGpu,
+    Light, LightKind, Renderer, ScatterMethod, Scene, Settings, TransmitMethod, antialias,
 };
 use rubor_rig::evaluate::{EnvironmentState, LightState, Shot};
 use rubor_rig::head::Head;
@@ -41,6 +41,7 @@ pub(crate) fn settings(
         size,
         scatter,
         transmit,
+        appearance: AppearanceMethods::default(),
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(mode, antialias::Preset::High),
         supersampling,

@@ -206,6 +206,155 @@ fn obj_sets_of_unequal_size_and_broken_numbers_are_refused() {
     import(&folder, &["smile.obj"]);
 }
 
+/// A head that is quick to write: two triangles, a shape, no maps.
+fn small_head(folder: &Folder) -> String {
+    let vertices = "v 0 0 0\nv 20 0 0\nv 20 25 0\nv 0 25 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    let faces = "usemtl skin\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+    std::fs::create_dir_all(folder.0.join("set")).expect("a folder");
+    folder.file("set/neutral.obj", format!("{vertices}{faces}").as_bytes());
+    folder.file("set/jawOpen.obj", format!("{vertices}{faces}").replace("v 0 0 0", "v 0 -2 0").as_bytes());
+    let (set, head) = (folder.path("set"), folder.path("small.glb"));
+    let output = rubor(&["import", &set, "--maps", "0", "-o", &head]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    head
+}
+
+const JAW: &str = r#"{ "fps": 24, "duration": 1, "shapes": { "jawOpen": [{ "t": 0, "v": 0, "ease": "smooth" }, { "t": 1, "v": 1 }] } }"#;
+
+#[test]
+fn a_head_goes_out_and_comes_back_with_its_performance() {
+    let folder = Folder::new("export");
+    let head = small_head(&folder);
+    let sequence = folder.file("s.json", JAW.as_bytes());
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        let output = rubor(arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).expect("a report is JSON")
+    };
+    let glb = folder.path("out.glb");
+    let report = json(&["export", "--head", &head, "--sequence", &sequence, "-o", &glb, "--json"]);
+    assert_eq!((&report["shapes"], &report["points"]), (&1.into(), &4.into()));
+    let back = folder.path("back.json");
+    let output =
+        rubor(&["import", &glb, "--sequence", &back, "--maps", "0", "-o", &folder.path("again.glb")]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(&back).expect("a sequence")).expect("JSON");
+    assert_eq!(read["shapes"]["jawOpen"][0]["ease"], "smooth");
+
+    let usd = folder.path("out.usda");
+    json(&["export", "--head", &glb, "-o", &usd, "--json"]);
+    let text = std::fs::read_to_string(&usd).expect("a layer");
+    assert!(text.starts_with("#usda 1.0") && text.contains("blendShapeWeights.timeSamples"));
+    // What is written stands beside the file, nothing half written is left.
+    let names = folder.names("");
+    assert!(!names.iter().any(|n| n.contains("part")), "{names:?}");
+
+    refused(&folder, &["export", "--head", &head, "-o", &folder.path("x.fbx")], &[".glb or .usda"]);
+    refused(&folder, &["export", "--textures", "ktx2", "-o", &glb], &["Basis Universal"]);
+    refused(&folder, &["export", "--head", &head, "--bake", "jooy", "-o", &glb], &["jooy", "\"joy\""]);
+    refused(
+        &folder,
+        &["export", "--head", &head, "--still", "--bake", "0.5", "-o", &glb],
+        &["needs a sequence"],
+    );
+    refused(
+        &folder,
+        &["export", "--head", &head, "--sequence", &sequence, "--bake", "7", "-o", &glb],
+        &["0 to 1 s"],
+    );
+    refused(&folder, &["export", "--head", &head, "--tolerance", "2", "-o", &glb], &["0.5"]);
+    refused(&folder, &["export", "--head", &head, "--textures", "webp", "-o", &usd], &["png or jpeg"]);
+    refused(&folder, &["export", "--head", &head, "-o", &folder.path("no/such/folder/x.glb")], &["x.glb"]);
+}
+
+#[test]
+fn check_gives_reasons_fixes_and_exit_codes() {
+    let folder = Folder::new("check");
+    let head = small_head(&folder);
+    let good = folder.file("s.json", JAW.as_bytes());
+    let check = |arguments: &[&str], code: i32| -> String {
+        let output = rubor(&[&["check"], arguments].concat());
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?} said {said}");
+        said
+    };
+    let said = check(&[&head, &good], 0);
+    assert!(said.contains("small.glb: glTF") && said.contains("s.json: sequence"), "{said}");
+    let late = folder.file("late.json", JAW.replace("\"t\": 1,", "\"t\": 3,").as_bytes());
+    assert!(check(&[&head, &late], 0).contains("has keys after the end"));
+    check(&["--strict", &head, &late], 2);
+    let typo = folder.file("typo.json", JAW.replace("jawOpen", "jawOpne").as_bytes());
+    let said = check(&[&head, &typo], 2);
+    assert!(said.contains("line 1") && said.contains("fix: write \"jawOpen\""), "{said}");
+    let take = folder.file("take.csv", b"Timecode,JawOpen,Wobble\n0:0:0:0,0,1\n0:0:1:0,1,0\n0:0:2:0,0,1\n");
+    let said = check(&[&head, &take], 0);
+    assert!(said.contains("column \"Wobble\"") && said.contains("51 ARKit columns are missing"), "{said}");
+    let retarget = folder.file("actor.json", br#"{ "shapes": { "Wobble": "jawOpen", "Nope": null } }"#);
+    let said = check(&[&head, &take, &retarget], 0);
+    assert!(!said.contains("\"Wobble\": no shape") && said.contains("\"Nope\""), "{said}");
+    let report: serde_json::Value = serde_json::from_str(&check(&["--json", &head, &take], 0)).expect("JSON");
+    assert_eq!(report["files"][1]["kind"], "capture");
+    assert!(report["files"][1]["findings"][0]["fix"].is_string());
+    check(&[&folder.path("nothing.glb")], 2);
+    check(&[&folder.file("x.txt", b"")], 2);
+}
+
+#[test]
+fn files_that_cannot_be_trusted_are_refused_and_nothing_is_written() {
+    let folder = Folder::new("hostile");
+    let out = folder.path("out.glb");
+    let import = |name: &str, content: &str, phrases: &[&str]| {
+        let file = folder.file(name, content.as_bytes());
+        let before = folder.names("");
+        let arguments: Vec<&str> = match name.rsplit('.').next() {
+            Some("ma") => vec!["maya", "import", &file, "-o", &out],
+            Some("csv") => vec!["import", "capture", &file, "-o", &out],
+            _ => vec!["import", &file, "--maps", "0", "-o", &out],
+        };
+        refused(&folder, &arguments, phrases);
+        assert_eq!(folder.names(""), before, "{name}");
+    };
+    let gltf = |buffer: &str, nodes: &str, accessor: &str| {
+        format!(
+            r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": {nodes},
+            "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
+            "accessors": [{{"bufferView": 0, "componentType": 5126, "count": {accessor}, "type": "VEC3", "min": [0,0,0], "max": [1,1,1]}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 36}}], "buffers": [{{"byteLength": 36, "uri": "{buffer}"}}]}}"#
+        )
+    };
+    let zeros = "data:;base64,AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA";
+    import("up.gltf", &gltf("../secret.bin", r#"[{"mesh": 0}]"#, "3"), &["secret.bin", "in the folder"]);
+    import("host.gltf", &gltf("http://example.org/x.bin", r#"[{"mesh": 0}]"#, "3"), &["in the folder"]);
+    import(
+        "ring.gltf",
+        &gltf(zeros, r#"[{"mesh": 0, "children": [1]}, {"children": [0]}]"#, "3"),
+        &["node 0", "a tree"],
+    );
+    import("far.gltf", &gltf(zeros, r#"[{"mesh": 0}]"#, "400"), &["POSITION", "view 0 of 36 bytes"]);
+    import("none.gltf", &gltf(zeros, r#"[{"mesh": 7}]"#, "3"), &["nodes[0].mesh"]);
+    import("broken.gltf", "{\"asset\"", &["broken.gltf"]);
+    import(
+        "needs.ma",
+        "//Maya ASCII 2024 scene\nrequires \"weta\" \"1\";\ncreateNode skinCluster -n \"s\";\n",
+        &["needs.ma"],
+    );
+    import(
+        "cut.ma",
+        "//Maya ASCII 2024 scene\ncreateNode mesh -n \"a\";\n\tsetAttr \".vt[0:9]\" 0 0",
+        &["cut.ma:"],
+    );
+    import("text.csv", "Timecode,JawOpen\n0:0:0:0,0.1\n0:0:1:0,wide\n", &["text.csv", "line 3", "wide"]);
+    import("empty.csv", "Timecode,JawOpen\n", &["empty.csv"]);
+    import("columns.csv", "a,b\n1,2\n", &["columns.csv"]);
+    // Columns in another order, some missing: read, and named.
+    let take = folder
+        .file("order.csv", b"JawOpen,Timecode,EyeBlinkLeft\n0.1,0:0:0:0,0\n0.2,0:0:1:0,1\n0.3,0:0:2:0,0\n");
+    let output = rubor(&["import", "capture", &take, "-o", &folder.path("order.json")]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(rubor(&["check", &take]).stdout.windows(21).any(|w| w == b"50 ARKit columns are "));
+}
+
 #[test]
 fn schemas_and_adapters_are_json() {
     for of in ["rig", "sequence"] {

@@ -42,6 +42,9 @@ pub(crate) struct Appearance {
     pub(crate) maps: Vec<MapEntry>,
     #[serde(default)]
     pub(crate) hair_color_linear: [f32; 3],
+    /// The rig file, as it is: expressions and combination shapes have no nodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) rig: Option<serde_json::Value>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -82,6 +85,7 @@ impl Appearance {
             occlusion: head.mesh.occlusion.clone(),
             maps: Vec::new(),
             hair_color_linear: head.maps.hair_color_linear,
+            rig: None,
         };
         let mut files = Vec::new();
         let maps = &head.maps;

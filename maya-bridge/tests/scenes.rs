@@ -229,6 +229,44 @@ fn a_head_and_its_performance_come_back_exactly() {
 }
 
 #[test]
+fn rigs_and_inbetweens_survive_a_baked_performance() {
+    let head = head();
+    let text = r#"{"expressions": {"open": {"shapes": {"jawOpen": 1}}},
+        "combinations": [{"shape": "eyeBlink_L", "drivers": ["jawOpen"]}],
+        "inbetweens": [{"shape": "jawOpen", "target": "jawOpen_half", "weight": 0.5}]}"#;
+    let rig = Rig::from_json("rig.json", text).unwrap();
+    let options = write::Options {
+        inbetweens: rig.inbetweens.clone(),
+        rig: Some(rig.clone()),
+        ..write::Options::default()
+    };
+    let written = |extra: &str| {
+        let text = format!(
+            r#"{{"fps": 24, "duration": 1, "expressions": {{"open": [{{"t": 0, "v": 0}}, {{"t": 1, "v": 1}}]}} {extra}}}"#
+        );
+        let sequence = Sequence::from_json("s.json", &text).unwrap();
+        let performance = Performance { rig: &rig, sequence: &sequence };
+        let scene = write::to_scene(&head, Some(performance), &options, "t").unwrap();
+        let read =
+            read::from_bytes(scene.text.as_bytes(), Path::new("/nowhere/t.ma"), &read::Options::default());
+        (scene.notes, read.unwrap())
+    };
+    // Maya shares the weight out itself: jawOpen is keyed as the expression has it.
+    let (_, back) = written("");
+    assert_eq!(back.inbetweens, rig.inbetweens);
+    let played = back.sequence.unwrap();
+    assert!((played.shapes["jawOpen"].at(0.25) - 0.25).abs() < 1e-6);
+    assert!((played.shapes["eyeBlink_L"].at(0.25) - 0.25).abs() < 1e-6, "the combination is in the weights");
+    let carried = Rig::from_json("rig", &back.rig.unwrap().to_string()).unwrap();
+    assert_eq!(carried, rig);
+    // An in-between that moves by itself cannot be one.
+    let (notes, back) = written(r#", "shapes": {"jawOpen_half": 0.25}"#);
+    assert!(notes.iter().any(|n| n.contains("moves by itself")), "{notes:?}");
+    assert!(back.inbetweens.is_empty());
+    assert!((back.sequence.unwrap().shapes["jawOpen_half"].at(0.25) - 0.75).abs() < 1e-6);
+}
+
+#[test]
 fn expressions_are_baked_with_the_colour_of_the_skin() {
     let head = head();
     let rig = Rig::from_json(

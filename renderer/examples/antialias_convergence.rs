@@ -44,12 +44,20 @@ fn letters(x: f64, y: f64) -> bool {
         && ROWS[row as usize][letter as usize] >> (3 - bit) & 1 == 1
 }
 
+/// Circles of a radius about 16 places in a pixel.
+fn circles(radius: f64) -> impl Iterator<Item = Scene> {
+    (0..16).map(move |i| {
+        let (x, y) = (0.25 * f64::from(i % 4), 0.25 * f64::from(i / 4));
+        turned(0.0, move |px, py| (px + x).hypot(py + y) < radius)
+    })
+}
+
 fn groups() -> Vec<(&'static str, Vec<Scene>)> {
     let angles = |step: usize| (0..90).step_by(step).map(|d| d as f64);
     vec![
         ("lines, 0 to 90 degrees", angles(1).map(|d| turned(d, |_, y| y > 0.0)).collect()),
         ("corners", angles(9).map(|d| turned(d, |x, y| x.abs() < 21.0 && y.abs() < 21.0)).collect()),
-        ("circles", [3.0, 7.5, 16.2, 33.7].map(|r| turned(0.0, move |x, y| x.hypot(y) < r)).into()),
+        ("circles", [3.0, 7.5, 16.2, 33.7].into_iter().flat_map(circles).collect()),
         ("wires, 0.6 px", angles(9).map(|d| turned(d, |_, y| (y + 60.0).rem_euclid(12.0) < 0.6)).collect()),
         ("wires, 1.5 px", angles(9).map(|d| turned(d, |_, y| (y + 60.0).rem_euclid(12.0) < 1.5)).collect()),
         ("letters", angles(15).map(|d| turned(d, letters)).collect()),

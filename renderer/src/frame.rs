@@ -11,7 +11,7 @@ use crate::gpu::Gpu;
 use crate::head::{GpuVertex, HeadOnGpu};
 use crate::pass_timer::{FrameLog, FrameTimes, PassTimer};
 use crate::passes::antialias::{self, Antialias, History};
-use crate::passes::appearance::{Appearance, Blended};
+use crate::passes::appearance::{Appearance, AppearanceMethods, Blended, ColorMethod};
 use crate::passes::compose::Compose;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
@@ -36,6 +36,8 @@ pub struct Settings {
     pub scatter: ScatterMethod,
     /// How light passes through thin parts.
     pub transmit: TransmitMethod,
+    /// How colour and wrinkles of the moment are drawn.
+    pub appearance: AppearanceMethods,
     /// How far light goes in skin, for every method.
     pub profile: Arc<Profile>,
     /// Antialiasing of the displayed image.
@@ -92,7 +94,8 @@ pub(crate) struct View {
     pub(crate) near: f32,
     pub(crate) light_count: u32,
     pub(crate) shading_jitter: [f32; 2],
-    pub(crate) padding: [f32; 2],
+    pub(crate) depth_origin_mm: f32,
+    pub(crate) padding: f32,
 }
 
 /// Draws scenes. Keeps pipelines, and images of the last size, between frames; nothing else carries over.
@@ -325,6 +328,18 @@ impl Renderer {
         Ok(frames.into_iter().map(frame).collect())
     }
 
+    /// Linear Rec. 709 albedo of the skin of the last frame (of its last sample), 0 elsewhere; a = 1 on skin. Rows from
+    /// the top.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_albedo(&self) -> Result<Vec<[f32; 4]>, RenderError> {
+        let Some(targets) = &self.targets else { return Ok(Vec::new()) };
+        let bytes = self.gpu.read_texture(targets.albedo.texture())?;
+        let halves: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
+    }
+
     /// Diffuse light of the last frame before albedo: linear radiance of a white surface, a = scattering strength.
     /// Rows from the top; with supersampling, the frame's own pixels.
     ///
@@ -333,9 +348,13 @@ impl Renderer {
     pub fn read_diffuse(&self) -> Result<Vec<[f32; 4]>, RenderError> {
         let Some(targets) = &self.targets else { return Ok(Vec::new()) };
         let image = if self.is_scattered { &targets.scattered } else { &targets.irradiance };
-        let halves: Vec<[half::f16; 4]> =
-            bytemuck::pod_collect_to_vec(&self.gpu.read_texture(image.texture())?);
-        Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
+        let read = |image: &wgpu::TextureView| -> Result<Vec<[half::f16; 4]>, RenderError> {
+            Ok(bytemuck::pod_collect_to_vec(&self.gpu.read_texture(image.texture())?))
+        };
+        let (light, strength) = (read(image)?, read(&targets.albedo)?);
+        let pixel =
+            |([r, g, b, _], [.., a]): ([half::f16; 4], [half::f16; 4])| [r, g, b, a].map(half::f16::to_f32);
+        Ok(light.into_iter().zip(strength).map(pixel).collect())
     }
 
     fn check(&self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
@@ -403,7 +422,10 @@ impl Renderer {
         for (i, head) in scene.heads.iter().enumerate() {
             let points = u64::from(head.head.point_count) * 16;
             let frames = u64::from(head.head.vertex_count) * FRAME_BYTES;
-            let fits = |n: &Instance| n.positions.size() == points && n.frames.size() == frames;
+            let wrinkle_maps = head.head.maps.as_ref().map_or(0, |m| m.wrinkle_maps);
+            let fits = |n: &Instance| {
+                n.positions.size() == points && n.frames.size() == frames && n.blended.fits(wrinkle_maps)
+            };
             if self.instances.get(i).is_some_and(fits) {
                 continue;
             }
@@ -411,7 +433,7 @@ impl Renderer {
                 positions: gpu.storage_zeroed("positions", points),
                 previous_positions: gpu.storage_zeroed("previous positions", points),
                 frames: gpu.storage_zeroed("surface frames", frames),
-                blended: Blended::new(gpu),
+                blended: Blended::new(gpu, wrinkle_maps),
             };
             self.instances.truncate(i);
             self.instances.push(instance);
@@ -446,7 +468,11 @@ impl Renderer {
             self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
             if let Some(maps) = &head.maps {
                 let state = instance.state;
-                let (distributions, zones) = (&state.distributions, &state.zones);
+                let distributions: &[f32] = match settings.appearance.color {
+                    ColorMethod::Static => &[],
+                    ColorMethod::Hemoglobin => &state.distributions,
+                };
+                let zones = &state.zones;
                 self.appearance.record(gpu, encoder, timer, maps, distributions, zones, &buffers.blended);
             }
         }
@@ -483,12 +509,13 @@ impl Renderer {
             };
             let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
             for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
-                let shaded = shaded(index, instance, head, buffers);
+                let shaded = shaded(index, instance, head, buffers, settings.appearance);
                 self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
             }
 
             let images = Images {
                 irradiance: &targets.irradiance,
+                albedo: &targets.albedo,
                 depth: &sample.depth,
                 scratch: &targets.scratch,
                 scattered: &targets.scattered,
@@ -500,13 +527,25 @@ impl Renderer {
                         view: &view,
                         ids: &sample.ids,
                         irradiance: &targets.irradiance,
+                        albedo: &targets.albedo,
                         depth: &sample.depth,
                         scattered: &targets.scattered,
                     };
                     // The sums need the light of this frame: the device works on it while samples are drawn.
                     let fresh = gpu.device.create_command_encoder(&Default::default());
                     gpu.queue.submit([std::mem::replace(encoder, fresh).finish()]);
-                    integrate(gpu, &self.shade, scene, &heads, &lighting, &integral, &inputs, batches)?;
+                    let appearance = settings.appearance;
+                    integrate(
+                        gpu,
+                        &self.shade,
+                        scene,
+                        &heads,
+                        &lighting,
+                        &integral,
+                        &inputs,
+                        appearance,
+                        batches,
+                    )?;
                     integral.record_finish(gpu, encoder, timer, &inputs);
                     scatter_noise = integral.relative_noise(gpu)?;
                     &targets.scattered
@@ -615,8 +654,19 @@ fn view(
         near: NEAR_METRES,
         light_count: scene.lights.len() as u32,
         shading_jitter,
-        padding: [0.0; 2],
+        depth_origin_mm: 1000.0 * nearest_head(scene, &view_from_world),
+        padding: 0.0,
     }
+}
+
+/// View depth of the nearest head, between its middle and its front, metres: depths near it are kept best.
+fn nearest_head(scene: &Scene<'_>, view_from_world: &Mat4) -> f32 {
+    let depth = |instance: &crate::scene::HeadInstance<'_>| {
+        let (low, high) = instance.head.bounds;
+        let middle = world_from_head(instance).transform_point3(0.5 * (low + high));
+        -view_from_world.transform_point3(middle).z - 0.25 * (high - low).min_element()
+    };
+    scene.heads.iter().map(depth).filter(|d| *d > 0.0).reduce(f32::min).unwrap_or(0.0)
 }
 
 /// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
@@ -631,6 +681,7 @@ fn integrate(
     lighting: &Lighting<'_>,
     integral: &Surface,
     inputs: &surface::Inputs<'_>,
+    appearance: AppearanceMethods,
     batches: u32,
 ) -> Result<(), RenderError> {
     let size = inputs.scattered.texture().size();
@@ -644,7 +695,7 @@ fn integrate(
         let point_of_vertex: Vec<u32> = vertices.iter().map(|v| v.point).collect();
         let opaque = &triangles[..head.opaque_triangles as usize];
         let skin = Skin::new(opaque, &point_of_vertex, &points, &clip_from_world, PICTURE_MARGIN);
-        let shaded = shaded(index, instance, head, buffers);
+        let shaded = shaded(index, instance, head, buffers, appearance);
         integral.add_head(gpu, inputs, index as u32, &skin, batches, &mut |encoder, samples, light| {
             let count = surface::BATCH as u32;
             shade.record_samples(gpu, encoder, lighting, &shaded, [samples, light], count);
@@ -658,6 +709,7 @@ fn shaded<'a>(
     instance: &crate::scene::HeadInstance<'_>,
     head: &'a HeadOnGpu,
     buffers: &'a Instance,
+    appearance: AppearanceMethods,
 ) -> Shaded<'a> {
     Shaded {
         index: index as u32,
@@ -665,7 +717,11 @@ fn shaded<'a>(
         positions: &buffers.positions,
         frames: &buffers.frames,
         blended: &buffers.blended,
-        hemoglobin_scale: instance.state.hemoglobin_scale,
+        hemoglobin_scale: match appearance.color {
+            ColorMethod::Static => 1.0,
+            ColorMethod::Hemoglobin => instance.state.hemoglobin_scale,
+        },
+        wrinkles: appearance.wrinkles,
         pupil_mm: instance.state.pupil_mm,
     }
 }

@@ -1,12 +1,14 @@
 //! A head on the device: geometry for the kernels, maps as textures. Never changes after upload.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::map::Map;
+use rubor_rig::mask::{Mask, resize_area};
 use wgpu::util::DeviceExt;
 
 use crate::error::RenderError;
+use crate::footprint::mask_size;
 use crate::gpu::Gpu;
 use crate::passes::cropped_hair;
 use crate::texture::{self, Texel};
@@ -15,8 +17,8 @@ use crate::texture::{self, Texel};
 pub const MAX_MELANIN: f32 = 0.5;
 /// Largest hemoglobin fraction of the skin colour table (papers/004 table 7.1).
 pub const MAX_HEMOGLOBIN: f32 = 0.32;
-/// Wrinkle maps that one head can have: a weight each in the channels of one texture.
-pub const MAX_WRINKLE_MAPS: usize = 4;
+/// Wrinkle maps that one head can have: a weight each in the channels of four layers.
+pub const MAX_WRINKLE_MAPS: usize = 16;
 /// Hemoglobin distributions that one head can have.
 pub const MAX_DISTRIBUTIONS: usize = 64;
 /// Wrinkle zones that one head can have.
@@ -169,11 +171,16 @@ impl HeadOnGpu {
             &self.hair_roots,
             &self.opaque_points,
         ];
+        buffers.iter().map(|b| b.size()).sum::<u64>() + self.map_bytes()
+    }
+
+    /// Bytes of the textures of its maps.
+    pub(crate) fn map_bytes(&self) -> u64 {
         let textures = self.maps.iter().flat_map(|m| {
             [&m.skin, &m.gloss, &m.slopes, &m.wrinkles, &m.distributions, &m.neutral_mean, &m.masks]
                 .map(texture_bytes)
         });
-        buffers.iter().map(|b| b.size()).sum::<u64>() + textures.sum::<u64>()
+        textures.sum()
     }
 }
 
@@ -275,7 +282,7 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
     let full = Map::filled(1, 1, &[1.0]);
     let scattering = maps.scattering.as_ref().unwrap_or(&full);
     let hair = maps.hair.as_ref().unwrap_or(&zero);
-    let size = largest(&[melanin, hemoglobin, scattering, hair]);
+    let size = largest_of([melanin, hemoglobin, scattering, hair]);
     let skin = texels(size, |u, v| {
         let axis = |value: f32, most: f32| (value.max(0.0) / most).cbrt();
         [
@@ -285,10 +292,10 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
             hair.sample(u, v, 0),
         ]
     });
-    let gloss_size = largest(&[specular]);
+    let gloss_size = largest_of([specular]);
     let gloss = texels(gloss_size, |u, v| [specular.sample(u, v, 0), specular.sample(u, v, 1), 0.0, 0.0]);
     let slopes = maps.slopes.as_ref().unwrap_or(&flat);
-    let slope_size = largest(&[slopes]);
+    let slope_size = largest_of([slopes]);
     // Channel 2 averages the squared slope on the way down, so that each level knows the variance it lost.
     let slope_texels = texels(slope_size, |u, v| {
         let (x, y) = (slopes.sample(u, v, 0), slopes.sample(u, v, 1));
@@ -300,12 +307,25 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
             t[2] = (t[2] - 0.5 * (t[0] * t[0] + t[1] * t[1])).max(0.0);
         }
     }
-    let wrinkle_size = largest(&maps.wrinkle_slopes.iter().chain([&flat]).collect::<Vec<_>>());
+    let wrinkle_size = largest_of(&maps.wrinkle_slopes);
+    // The relief as coarse as the wrinkles: what a difference of normals is taken from.
+    let mask = Mask::full(slopes.width, slopes.height);
+    let coarse = if maps.wrinkle_slopes.is_empty() || slopes.width <= wrinkle_size[0] {
+        slopes.clone()
+    } else {
+        resize_area(slopes, &mask, wrinkle_size[0], wrinkle_size[1]).0
+    };
     let mut wrinkle_layers: Vec<_> = maps
         .wrinkle_slopes
         .iter()
         .map(|m| {
-            let level = texels(wrinkle_size, |u, v| [m.sample(u, v, 0), m.sample(u, v, 1), 0.0, 0.0]);
+            let level = texels(wrinkle_size, |u, v| {
+                let (x, y) = (m.sample(u, v, 0), m.sample(u, v, 1));
+                let base = Vec2::new(coarse.sample(u, v, 0), coarse.sample(u, v, 1));
+                let normal = |slopes: Vec2| slopes.extend(1.0).normalize().truncate();
+                let difference = normal(base + Vec2::new(x, y)) - normal(base);
+                [x, y, difference.x, difference.y]
+            });
             texture::mip_chain(wrinkle_size, level)
         })
         .collect();
@@ -329,36 +349,43 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
         distributions.push(vec![vec![[0.0; 4]; (APPEARANCE_SIZE * APPEARANCE_SIZE) as usize]]);
     }
     let means = vec![texels(side, |u, v| [mean.sample(u, v, 0), 0.0, 0.0, 0.0])];
+    let mask_size = mask_size(maps);
     let mut masks: Vec<_> = maps
         .zones
         .chunks(4)
         .map(|zones| {
             let weights =
                 |u, v| std::array::from_fn(|i| zones.get(i).map_or(0.0, |z| z.mask.sample(u, v, 0)));
-            vec![texels(side, weights)]
+            vec![texels(mask_size, weights)]
         })
         .collect();
     if masks.is_empty() {
-        masks.push(vec![vec![[0.0; 4]; (APPEARANCE_SIZE * APPEARANCE_SIZE) as usize]]);
+        masks.push(vec![vec![[0.0; 4]]]);
     }
 
     Some(MapsOnGpu {
-        skin: texture::upload_bytes(gpu, "skin", size, &[texture::mip_chain(size, skin)]),
-        gloss: texture::upload_bytes(gpu, "gloss", gloss_size, &[texture::mip_chain(gloss_size, gloss)]),
+        skin: texture::upload_bytes::<4>(gpu, "skin", size, &[texture::mip_chain(size, skin)]),
+        gloss: texture::upload_bytes::<2>(gpu, "gloss", gloss_size, &[texture::mip_chain(gloss_size, gloss)]),
         hair_color_linear: maps.hair_color_linear,
         slopes: texture::upload_half(gpu, "slopes", slope_size, &[slope_chain]),
         wrinkles: texture::array_view(&texture::upload_half(gpu, "wrinkles", wrinkle_size, &wrinkle_layers)),
         wrinkle_maps: maps.wrinkle_slopes.len() as u32,
-        distributions: texture::array_view(&texture::upload_half(gpu, "distributions", side, &distributions)),
+        distributions: texture::array_view(&texture::upload_half_channels::<2>(
+            gpu,
+            "distributions",
+            side,
+            &distributions,
+        )),
         distribution_count: maps.distributions.len() as u32,
-        neutral_mean: texture::upload_half(gpu, "neutral mean", side, &[means]),
-        masks: texture::array_view(&texture::upload_bytes(gpu, "zone masks", side, &masks)),
+        neutral_mean: texture::upload_half_channels::<1>(gpu, "neutral mean", side, &[means]),
+        masks: texture::array_view(&texture::upload_bytes::<4>(gpu, "zone masks", mask_size, &masks)),
         zone_maps: maps.zones.iter().map(|z| z.wrinkle_map).collect(),
     })
 }
 
-fn largest(maps: &[&Map]) -> [u32; 2] {
-    maps.iter().fold([1, 1], |s, m| [s[0].max(m.width), s[1].max(m.height)])
+/// The size that holds all of some maps: at least one texel.
+pub(crate) fn largest_of<'a>(maps: impl IntoIterator<Item = &'a Map>) -> [u32; 2] {
+    maps.into_iter().fold([1, 1], |s, m| [s[0].max(m.width), s[1].max(m.height)])
 }
 
 /// Texels of an image of this size from a function of texture space.

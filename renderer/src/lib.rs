@@ -19,6 +19,7 @@
 
 mod environment;
 mod error;
+pub mod footprint;
 mod frame;
 mod gpu;
 mod head;
@@ -41,6 +42,7 @@ pub use head::{
 };
 pub use pass_timer::{FrameTimes, PassTimer};
 pub use passes::antialias;
+pub use passes::appearance::{AppearanceMethods, ColorMethod, WrinkleMethod};
 pub use passes::scatter::ScatterMethod;
 pub use passes::shade::TransmitMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

@@ -17,8 +17,8 @@ use crate::passes::{
 };
 use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
 use crate::{
-    Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
-    Renderer, ScatterMethod, Scene, Settings, TransmitMethod,
+    AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light,
+    LightKind, RenderError, Renderer, ScatterMethod, Scene, Settings, TransmitMethod,
 };
 
 #[test]
@@ -48,7 +48,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             previous_clip_from_world as "previous_clip_from_world", origin as "origin", right as "right",
             up as "up", forward as "forward", size as "size", head_count as "head_count",
             has_environment as "has_environment", jitter as "jitter", near as "near",
-            light_count as "light_count", shading_jitter as "shading_jitter"),
+            light_count as "light_count", shading_jitter as "shading_jitter", depth_origin_mm as "depth_origin_mm"),
     );
     assert_layout(
         &visibility::shader(false),
@@ -67,7 +67,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
         "Params",
         size_of::<appearance::Params>(),
         &offsets!(appearance::Params; distribution_count as "distribution_count", zone_count as "zone_count",
-            distribution_weights as "distribution_weights", zone_weights as "zone_weights",
+            wrinkle_layers as "wrinkle_layers", distribution_weights as "distribution_weights", zone_weights as "zone_weights",
             zone_maps as "zone_maps"),
     );
     assert_layout(
@@ -85,7 +85,8 @@ fn structs_are_laid_out_alike_on_both_sides() {
             hemoglobin_scale as "hemoglobin_scale", head as "head",
             environment_intensity as "environment_intensity", environment_levels as "environment_levels",
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", transmit as "transmit", hair_color as "hair_color",
-            is_second_sample as "is_second_sample", pupil_mm as "pupil_mm", harmonics as "harmonics", lights as "lights"),
+            is_second_sample as "is_second_sample", adds_differences as "adds_differences",
+            pupil_mm as "pupil_mm", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
         overlay::SHADER,
@@ -159,17 +160,18 @@ pub(crate) fn dome() -> Head {
 pub(crate) const WHITE_TABLE: ColorTable<'static> =
     ColorTable { width: 2, height: 2, texels: &[[0.8; 3]; 4] };
 
-fn renderer() -> Option<Renderer> {
+pub(crate) fn renderer() -> Option<Renderer> {
     gpu()?;
     let gpu = Gpu::new(std::env::var("RUBOR_ADAPTER").ok().as_deref()).ok()?;
     Some(Renderer::new(gpu).expect("the passes compile"))
 }
 
-fn settings(size: [u32; 2]) -> Settings {
+pub(crate) fn settings(size: [u32; 2]) -> Settings {
     Settings {
         size,
         scatter: ScatterMethod::Separable(17),
         transmit: TransmitMethod::ShadowDepth,
+        appearance: AppearanceMethods::default(),
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
         supersampling: 1,
@@ -181,7 +183,7 @@ fn settings(size: [u32; 2]) -> Settings {
 const CAMERA: Camera =
     Camera { position: Vec3::new(0.0, 0.0, 0.5), target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 25.0 };
 
-fn lamp() -> Light {
+pub(crate) fn lamp() -> Light {
     Light {
         kind: LightKind::Spot {
             position: Vec3::new(0.4, 0.5, 0.7),
@@ -195,7 +197,7 @@ fn lamp() -> Light {
     }
 }
 
-fn draw(
+pub(crate) fn draw(
     renderer: &mut Renderer,
     head: &HeadOnGpu,
     state: &FaceState,

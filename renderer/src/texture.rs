@@ -38,21 +38,49 @@ pub(crate) fn upload_half(
     size: [u32; 2],
     layers: &[Vec<Vec<Texel>>],
 ) -> wgpu::TextureView {
-    upload(gpu, label, size, layers, wgpu::TextureFormat::Rgba16Float, &|texels| {
-        texels.par_iter().with_min_len(4096).flat_map_iter(|t| t.map(f16::from_f32)).collect::<Vec<_>>()
-    })
+    upload_half_channels::<4>(gpu, label, size, layers)
 }
 
-/// A texture array of 8-bit values 0 to 1; `layers[layer][level][texel]`.
-pub(crate) fn upload_bytes(
+/// As [`upload_half`] with the first 1, 2 or 4 channels.
+pub(crate) fn upload_half_channels<const N: usize>(
     gpu: &Gpu,
     label: &str,
     size: [u32; 2],
     layers: &[Vec<Vec<Texel>>],
 ) -> wgpu::TextureView {
-    upload(gpu, label, size, layers, wgpu::TextureFormat::Rgba8Unorm, &|texels| {
+    use wgpu::TextureFormat as F;
+    let format = const {
+        match N {
+            1 => F::R16Float,
+            2 => F::Rg16Float,
+            _ => F::Rgba16Float,
+        }
+    };
+    upload(gpu, label, size, layers, format, &|texels| {
+        let first = |t: &Texel| std::array::from_fn::<f16, N, _>(|c| f16::from_f32(t[c]));
+        texels.par_iter().with_min_len(4096).flat_map_iter(first).collect::<Vec<_>>()
+    })
+}
+
+/// A texture array of 8-bit values 0 to 1 with the first 1, 2 or 4 channels; `layers[layer][level][texel]`.
+pub(crate) fn upload_bytes<const N: usize>(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 2],
+    layers: &[Vec<Vec<Texel>>],
+) -> wgpu::TextureView {
+    use wgpu::TextureFormat as F;
+    let format = const {
+        match N {
+            1 => F::R8Unorm,
+            2 => F::Rg8Unorm,
+            _ => F::Rgba8Unorm,
+        }
+    };
+    upload(gpu, label, size, layers, format, &|texels| {
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
-        texels.par_iter().with_min_len(4096).flat_map_iter(|t| t.map(byte)).collect::<Vec<_>>()
+        let first = |t: &Texel| std::array::from_fn::<u8, N, _>(|c| byte(t[c]));
+        texels.par_iter().with_min_len(4096).flat_map_iter(first).collect::<Vec<_>>()
     })
 }
 
@@ -75,7 +103,7 @@ fn upload<T: bytemuck::Pod>(
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    let texel_bytes = 4 * size_of::<T>() as u32;
+    let texel_bytes = format.block_copy_size(None).unwrap_or(4);
     for (layer, chain) in layers.iter().enumerate() {
         for (level, texels) in chain.iter().enumerate() {
             let width = (size[0] >> level).max(1);

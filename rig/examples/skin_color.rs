@@ -3,8 +3,12 @@
 //! `cargo run --release -p rubor-rig --example skin_color [PHOTONS [FILE.ppm]]`; with photons (a wavelength) it also
 //! compares with photon walks.
 
-use rubor_rig::color::{ciede2000, individual_typology_angle_degrees, lab_from_rec709, srgb_encode};
+use rubor_rig::color::{
+    ciede2000, individual_typology_angle_degrees, lab_from_rec709, rec709_from_lab, srgb_encode,
+};
+use rubor_rig::skin::chromophores::invert::SkinInverse;
 use rubor_rig::skin::chromophores::monte_carlo::{self, Walk};
+use rubor_rig::skin::chromophores::published::{PUBLISHED, Source};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel, fractions_at, skin_color_direct};
 
 fn main() {
@@ -40,6 +44,7 @@ fn main() {
         }
         println!("  m={m}");
     }
+    published();
     let photons = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(0);
     if photons > 0 {
         for mean_cosine in [0.0, 0.8] {
@@ -74,5 +79,36 @@ fn main() {
             }
         }
         std::fs::write(file, bytes).expect("the picture cannot be written");
+    }
+}
+
+/// Distance of published colours to the model, and by the two constants that move it most.
+fn published() {
+    let fits = |model: &ChromophoreModel| {
+        let lookup = SkinModel::new(model).bake(64, 64);
+        let inverse = SkinInverse::new(&lookup);
+        PUBLISHED.map(|p| inverse.fit(rec709_from_lab(p.lab).map(|c| c as f32)))
+    };
+    for (color, fit) in PUBLISHED.iter().zip(fits(&ChromophoreModel::default())) {
+        println!(
+            "{:26} {:?} {:?}: melanin {:.3}, hemoglobin {:.4}, CIEDE2000 {:.2}",
+            color.name, color.source, color.lab, fit.melanin, fit.hemoglobin, fit.residual
+        );
+    }
+    println!("mean CIEDE2000: Xiao, de Rigal, ColorChecker, Monk; tone 8 alone");
+    for eumelanin_share in [0.5, 0.61, 0.74, 0.87, 1.0] {
+        for epidermis_thickness_mm in [0.05, 0.06, 0.07, 0.08, 0.1] {
+            let model = ChromophoreModel { eumelanin_share, epidermis_thickness_mm, ..Default::default() };
+            let fits = fits(&model);
+            print!("eumelanin {eumelanin_share}, epidermis {epidermis_thickness_mm} mm:");
+            for source in [Source::Xiao2017, Source::DeRigal2010, Source::ColorChecker, Source::Monk2019] {
+                let of: Vec<f32> = (PUBLISHED.iter().zip(&fits))
+                    .filter(|(p, _)| p.source == source)
+                    .map(|(_, f)| f.residual)
+                    .collect();
+                print!(" {:.2}", of.iter().sum::<f32>() / of.len() as f32);
+            }
+            println!(", {:.2}", fits[19].residual);
+        }
     }
 }

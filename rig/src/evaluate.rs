@@ -217,6 +217,23 @@ impl Evaluator {
 
     /// Everything at a time in seconds. Before the start and after the end the first and last values hold.
     pub fn at(&self, time_s: f64) -> Shot {
+        let radians = |track: &Track<f32>| track.at(time_s).to_radians();
+        let environment = self.sequence.environment.as_ref().map(|environment| EnvironmentState {
+            name: environment.name.clone(),
+            intensity: environment.intensity.at(time_s),
+            rotation_y: radians(&environment.rotation_degrees),
+        });
+        Shot {
+            time_s,
+            face: self.face_at(time_s),
+            camera: self.camera(time_s),
+            lights: self.lights(time_s),
+            environment,
+        }
+    }
+
+    /// The face alone at a time in seconds.
+    pub fn face_at(&self, time_s: f64) -> FaceState {
         let mut weights = self.rig.neutral_weights();
         for (index, track) in &self.expressions {
             weights.expressions[*index] = track.at(time_s);
@@ -247,10 +264,9 @@ impl Evaluator {
             }
         }
         let head = &self.sequence.head;
-        let radians = |track: &Track<f32>| track.at(time_s).to_radians();
         let sum = |track: &Track<f32>, more: f32| (track.at(time_s) + more).to_radians();
         let [head_yaw, head_pitch, head_roll] = motion.head_degrees;
-        let face = FaceState {
+        FaceState {
             head_rotation: Quat::from_euler(
                 EulerRot::YXZ,
                 sum(&head.yaw_degrees, head_yaw),
@@ -260,13 +276,7 @@ impl Evaluator {
             head_translation: Vec3::from(head.translation.at(time_s)) + Vec3::from(motion.translation),
             pupil_mm: eyes.map_or(CALM_PUPIL_MM, |eyes| eyes.pupil_mm.at(time_s)),
             ..self.rig.face(&weights)
-        };
-        let environment = self.sequence.environment.as_ref().map(|environment| EnvironmentState {
-            name: environment.name.clone(),
-            intensity: environment.intensity.at(time_s),
-            rotation_y: radians(&environment.rotation_degrees),
-        });
-        Shot { time_s, face, camera: self.camera(time_s), lights: self.lights(time_s), environment }
+        }
     }
 
     fn camera(&self, time_s: f64) -> CameraState {

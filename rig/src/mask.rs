@@ -1,5 +1,7 @@
 //! Which texels of a map carry data, and what follows from it: averages and filling that never mix in the rest.
 
+use rayon::prelude::*;
+
 use crate::map::Map;
 
 /// The mapped texels of a map: those that a surface uses or a camera saw.
@@ -67,16 +69,12 @@ pub fn resize_area(map: &Map, mask: &Mask, width: u32, height: u32) -> (Map, Mas
     };
     let (xs, ys) = (spans(map.width, width), spans(map.height, height));
     let channels = map.channels as usize;
-    let mut out = Map {
-        width,
-        height,
-        channels: map.channels,
-        values: Vec::with_capacity(width as usize * height as usize * channels),
-    };
-    let mut mapped = Vec::with_capacity(width as usize * height as usize);
-    let mut sums = vec![0.0f64; channels];
-    for rows in &ys {
-        for columns in &xs {
+    let count = width as usize * height as usize;
+    let mut out = Map { width, height, channels: map.channels, values: vec![0.0; count * channels] };
+    let mut mapped = vec![false; count];
+    let row = |rows: &[(usize, f64)], out: &mut [f32], mapped: &mut [bool]| {
+        let mut sums = vec![0.0f64; channels];
+        for ((columns, out), mapped) in xs.iter().zip(out.chunks_exact_mut(channels)).zip(mapped) {
             sums.fill(0.0);
             let mut weight = 0.0;
             for (y, wy) in rows {
@@ -90,10 +88,18 @@ pub fn resize_area(map: &Map, mask: &Mask, width: u32, height: u32) -> (Map, Mas
                     }
                 }
             }
-            mapped.push(weight > 0.0);
-            out.values.extend(sums.iter().map(|s| if weight > 0.0 { (s / weight) as f32 } else { 0.0 }));
+            *mapped = weight > 0.0;
+            if *mapped {
+                for (o, s) in out.iter_mut().zip(&sums) {
+                    *o = (s / weight) as f32;
+                }
+            }
         }
-    }
+    };
+    ys.par_iter()
+        .zip(out.values.par_chunks_exact_mut(width as usize * channels))
+        .zip(mapped.par_chunks_exact_mut(width as usize))
+        .for_each(|((rows, out), mapped)| row(rows, out, mapped));
     (out, Mask { width, height, mapped })
 }
 

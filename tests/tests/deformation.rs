@@ -50,6 +50,7 @@ fn kernel_and_cpu_agree_over_the_demo() -> Result<(), RenderError> {
         size: [16, 16],
         scatter: ScatterMethod::None,
         transmit: TransmitMethod::None,
+        appearance: Default::default(),
         profile: std::sync::Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
         supersampling: 1,

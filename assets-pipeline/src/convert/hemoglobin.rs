@@ -1,12 +1,13 @@
 //! Measured hemoglobin maps into distributions (papers/004 section 7.4, equations 7.1 and 7.5).
 //!
 //! A manifest (or the same fields by arguments) names a neutral map and any number of others. Numbers become volume
-//! fractions by unit and calibration; texels outside the mask never mix with skin.
+//! fractions by unit and calibration; texels outside the mask never mix with skin. With a head, its skin is a mask
+//! too, and its own blood may be the neutral map.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use rubor_rig::head::Distribution;
+use rubor_rig::head::{Distribution, Head};
 use rubor_rig::hemoglobin::{self, DISTRIBUTION_SIZE};
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, fill_unmapped};
@@ -14,14 +15,20 @@ use rubor_rig::skin::chromophores::MAX_HEMOGLOBIN;
 use serde::{Deserialize, Serialize};
 
 use super::ConvertError;
+use super::skin_texels::{SkinTexels, require_layout};
 use crate::image_io::{ImageError, SampleKind, load_image, save_image};
+
+/// Share of mapped texels outside of 0..0.32 above which a map is refused: its unit is then another one.
+const MOST_CLAMPED: f64 = 0.5;
 
 /// What the numbers of a hemoglobin map mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HemoglobinUnit {
-    /// 1 (white, the largest code) is the largest fraction of the model, 0.32. The default for integer files.
+    /// `normalized` for files of integers, `volume-fraction` for files of floats.
     #[default]
+    Automatic,
+    /// 1 (white, the largest code) is the largest fraction of the model, 0.32.
     Normalized,
     /// Volume fraction of the dermis.
     VolumeFraction,
@@ -30,10 +37,11 @@ pub enum HemoglobinUnit {
 }
 
 impl HemoglobinUnit {
-    /// Volume fraction of one unit.
-    fn factor(self) -> f64 {
+    /// Volume fraction of one unit in a file of these samples.
+    fn factor(self, kind: SampleKind) -> f64 {
         match self {
-            Self::Normalized => MAX_HEMOGLOBIN,
+            Self::Automatic if kind == SampleKind::F32 => 1.0,
+            Self::Automatic | Self::Normalized => MAX_HEMOGLOBIN,
             Self::VolumeFraction => 1.0,
             Self::Percent => 0.01,
         }
@@ -45,13 +53,14 @@ impl FromStr for HemoglobinUnit {
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
         match name {
+            "automatic" => Ok(Self::Automatic),
             "normalized" => Ok(Self::Normalized),
             "volume-fraction" => Ok(Self::VolumeFraction),
             "percent" => Ok(Self::Percent),
             other => Err(ConvertError::argument(
                 "unit",
                 format!("{other:?}"),
-                "normalized, volume-fraction or percent",
+                "automatic, normalized, volume-fraction or percent",
             )),
         }
     }
@@ -92,8 +101,9 @@ pub struct HemoglobinSource {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HemoglobinManifest {
-    /// Neutral map, relative to the manifest.
-    pub neutral: PathBuf,
+    /// Neutral map, relative to the manifest; that of the head without.
+    #[serde(default)]
+    pub neutral: Option<PathBuf>,
     /// The other maps.
     #[serde(default)]
     pub distributions: Vec<HemoglobinSource>,
@@ -130,6 +140,9 @@ pub struct HemoglobinMaps {
     pub radius_px: u32,
     /// Mapped texels that left 0..0.32 and were clamped, of all maps.
     pub clamped_texels: usize,
+    /// Maps without any contrast where they are mapped: their scale is 0, 1 or the largest, as the rules of
+    /// [`rubor_rig::hemoglobin`] say.
+    pub constant: Vec<String>,
 }
 
 /// Reads a manifest.
@@ -144,11 +157,23 @@ pub fn read_manifest(file: &Path) -> Result<HemoglobinManifest, ConvertError> {
     })
 }
 
-/// A map of volume fractions with its mask and the number of texels that were clamped to 0..0.32.
+/// A map of volume fractions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fractions {
+    /// 1 channel, 0 where unmapped.
+    pub map: Map,
+    /// Texels that alpha keeps.
+    pub mask: Mask,
+    /// Mapped texels that were clamped to 0..0.32.
+    pub clamped_texels: usize,
+}
+
+/// Reads a map of volume fractions.
 ///
 /// # Errors
-/// An image that is not grey or not finite where mapped; a calibration that is not finite.
-pub fn read_fractions(file: &Path, calibration: Calibration) -> Result<(Map, Mask, usize), ConvertError> {
+/// An image that is not grey or not finite where mapped; a calibration that is not finite, or that sends more than half
+/// of the texels out of 0..0.32.
+pub fn read_fractions(file: &Path, calibration: Calibration) -> Result<Fractions, ConvertError> {
     if !(calibration.gain.is_finite() && calibration.offset.is_finite()) {
         let found = format!("gain {}, offset {}", calibration.gain, calibration.offset);
         return Err(ConvertError::argument(file.display().to_string(), found, "finite numbers"));
@@ -157,68 +182,99 @@ pub fn read_fractions(file: &Path, calibration: Calibration) -> Result<(Map, Mas
     let mask = image.mask();
     image.require_finite(&mask)?;
     let mut map = image.require_grey()?;
-    let factor = calibration.unit.factor();
-    let mut clamped = 0;
+    let factor = calibration.unit.factor(image.kind);
+    let mut clamped_texels = 0;
     for (v, mapped) in map.values.iter_mut().zip(&mask.mapped) {
         if *mapped {
             let fraction = (f64::from(*v) * calibration.gain + calibration.offset) * factor;
             // Rounding of a code is no violation.
-            clamped += usize::from(!(-1e-4..=MAX_HEMOGLOBIN + 1e-4).contains(&fraction));
+            clamped_texels += usize::from(!(-1e-4..=MAX_HEMOGLOBIN + 1e-4).contains(&fraction));
             *v = fraction.clamp(0.0, MAX_HEMOGLOBIN) as f32;
         } else {
             *v = 0.0;
         }
     }
-    Ok((map, mask, clamped))
+    if clamped_texels as f64 > MOST_CLAMPED * mask.count() as f64 {
+        let share = 100 * clamped_texels / mask.count().max(1);
+        let found = format!("{share} % of the texels outside of 0 to {MAX_HEMOGLOBIN} volume fraction");
+        return Err(ConvertError::argument(
+            file.display().to_string(),
+            found,
+            "another unit or calibration (units: automatic, normalized, volume-fraction, percent)",
+        ));
+    }
+    Ok(Fractions { map, mask, clamped_texels })
 }
 
 /// Converts all maps of a manifest whose files are relative to `folder`.
 ///
-/// Maps may differ in size from the neutral one. Texels that the mask leaves out are filled from the skin around them
-/// in every result, so filtering across a texture seam stays on skin.
+/// Maps may differ in size from the neutral one, not in proportions. Texels that the masks or the skin of the head
+/// leave out are filled from the skin around them in every result, so filtering across a texture seam stays on skin.
 ///
 /// # Errors
-/// The first file, map or number that cannot be used.
-pub fn convert(manifest: &HemoglobinManifest, folder: &Path) -> Result<HemoglobinMaps, ConvertError> {
+/// The first file, map or number that cannot be used; a map in another layout than the head's.
+pub fn convert(
+    manifest: &HemoglobinManifest,
+    folder: &Path,
+    head: Option<&Head>,
+) -> Result<HemoglobinMaps, ConvertError> {
     if manifest.size == 0 {
         return Err(ConvertError::argument("size", "0", "at least 1 texel"));
     }
     for (i, source) in manifest.distributions.iter().enumerate() {
-        if source.name.is_empty() || manifest.distributions[..i].iter().any(|s| s.name == source.name) {
+        let name = &source.name;
+        if name.is_empty()
+            || name.contains(['/', '\\'])
+            || manifest.distributions[..i].iter().any(|s| s.name == *name)
+        {
             let at = format!("distribution {i}");
-            return Err(ConvertError::argument(at, format!("name {:?}", source.name), "a name of its own"));
+            let expected = "a name of its own that can be a file's";
+            return Err(ConvertError::argument(at, format!("name {name:?}"), expected));
         }
     }
-    let neutral_file = folder.join(&manifest.neutral);
-    let (mut neutral, mut mask, mut clamped_texels) = read_fractions(&neutral_file, manifest.calibration)?;
+    let (mut neutral, neutral_name) = neutral_of(manifest, folder, head)?;
+    let (width, height) = (neutral.map.width, neutral.map.height);
+    let mut mask = neutral.mask.clone();
     if let Some(file) = &manifest.mask {
         let image = load_image(&folder.join(file))?;
-        image.require_size(neutral.width, neutral.height)?;
+        image.require_size(width, height)?;
         mask = mask.and(&Mask::above(&image.require_grey()?, 0, 0.5));
     }
-    if mask.count() == 0 {
-        let found = "no mapped texel";
-        return Err(ConvertError::argument(neutral_file.display().to_string(), found, "some skin"));
+    if let Some(head) = head {
+        let skin = SkinTexels::new(head, width, height).mask();
+        require_layout(&neutral_name, &data_of(&neutral.map, &mask), &skin)?;
+        mask = mask.and(&skin);
     }
-    let radius_px = manifest.radius_px.unwrap_or_else(|| (neutral.width.max(neutral.height) / 64).max(1));
+    if mask.count() == 0 {
+        return Err(ConvertError::argument(neutral_name, "no mapped texel", "some skin"));
+    }
+    let radius_px = manifest.radius_px.unwrap_or_else(|| default_radius(&neutral.map));
     let failed = |name: &str| {
         let name = name.to_owned();
         move |source| ConvertError::Hemoglobin { name, source }
     };
+    let mut constant = Vec::new();
+    if is_constant(&neutral.map, &mask) {
+        constant.push("neutral".to_owned());
+    }
     let statistics =
-        hemoglobin::neutral(&neutral, &mask, radius_px, manifest.size).map_err(failed("neutral"))?;
+        hemoglobin::neutral(&neutral.map, &mask, radius_px, manifest.size).map_err(failed("neutral"))?;
+    let mut clamped_texels = neutral.clamped_texels;
     let mut distributions = Vec::with_capacity(manifest.distributions.len());
     for source in &manifest.distributions {
         let calibration = source.calibration.unwrap_or(manifest.calibration);
-        let (target, target_mask, clamped) = read_fractions(&folder.join(&source.file), calibration)?;
-        clamped_texels += clamped;
-        let same_size = (target.width, target.height) == (neutral.width, neutral.height);
-        let target_mask = if same_size { target_mask.and(&mask) } else { target_mask };
+        let file = folder.join(&source.file);
+        let target = read_fractions(&file, calibration)?;
+        clamped_texels += target.clamped_texels;
+        let target_mask = target_mask(&file, &target, &mask, head)?;
+        if is_constant(&target.map, &target_mask) {
+            constant.push(source.name.clone());
+        }
         distributions.push(
             hemoglobin::distribution(
                 &source.name,
                 &statistics,
-                &target,
+                &target.map,
                 &target_mask,
                 radius_px,
                 manifest.size,
@@ -226,15 +282,82 @@ pub fn convert(manifest: &HemoglobinManifest, folder: &Path) -> Result<Hemoglobi
             .map_err(failed(&source.name))?,
         );
     }
-    fill_unmapped(&mut neutral, &mask);
+    fill_unmapped(&mut neutral.map, &mask);
     Ok(HemoglobinMaps {
-        neutral,
+        neutral: neutral.map,
         neutral_mean: statistics.mean,
         mask,
         distributions,
         radius_px,
         clamped_texels,
+        constant,
     })
+}
+
+/// A 64th of the larger side.
+pub fn default_radius(neutral: &Map) -> u32 {
+    (neutral.width.max(neutral.height) / 64).max(1)
+}
+
+/// The neutral map of a manifest, or the head's own, and its name for messages.
+fn neutral_of(
+    manifest: &HemoglobinManifest,
+    folder: &Path,
+    head: Option<&Head>,
+) -> Result<(Fractions, String), ConvertError> {
+    if let Some(file) = &manifest.neutral {
+        let file = folder.join(file);
+        return Ok((read_fractions(&file, manifest.calibration)?, file.display().to_string()));
+    }
+    let expected = "a neutral map, or a head that has one";
+    let Some(head) = head else { return Err(ConvertError::argument("neutral", "nothing", expected)) };
+    let Some(map) = head.maps.hemoglobin.clone() else {
+        let found = format!("head {:?} without hemoglobin", head.name);
+        return Err(ConvertError::argument("neutral", found, expected));
+    };
+    let mask = Mask::full(map.width, map.height);
+    Ok((Fractions { map, mask, clamped_texels: 0 }, format!("hemoglobin of head {:?}", head.name)))
+}
+
+/// Mapped texels of a target, in its own size.
+fn target_mask(
+    file: &Path,
+    target: &Fractions,
+    neutral_mask: &Mask,
+    head: Option<&Head>,
+) -> Result<Mask, ConvertError> {
+    let (width, height) = (target.map.width, target.map.height);
+    let (to_width, to_height) = (neutral_mask.width, neutral_mask.height);
+    if (width, height) == (to_width, to_height) {
+        if let Some(head) = head {
+            let skin = SkinTexels::new(head, width, height).mask();
+            require_layout(&file.display().to_string(), &data_of(&target.map, &target.mask), &skin)?;
+        }
+        return Ok(target.mask.and(neutral_mask));
+    }
+    // Rounding to whole texels is no other proportion.
+    let expected = f64::from(width) * f64::from(to_height) / f64::from(to_width);
+    if (expected - f64::from(height)).abs() > 1.0 {
+        let found = format!("{width}x{height} texels");
+        let expected = format!("the proportions of the neutral map, {to_width}x{to_height}");
+        return Err(ConvertError::argument(file.display().to_string(), found, expected));
+    }
+    let Some(head) = head else { return Ok(target.mask.clone()) };
+    let skin = SkinTexels::new(head, width, height).mask();
+    require_layout(&file.display().to_string(), &data_of(&target.map, &target.mask), &skin)?;
+    Ok(target.mask.and(&skin))
+}
+
+/// Mapped texels that hold something: black counts as the background of a map without alpha.
+fn data_of(map: &Map, mask: &Mask) -> Mask {
+    let mapped = mask.mapped.iter().zip(&map.values).map(|(m, v)| *m && *v > 0.0).collect();
+    Mask { mapped, ..*mask }
+}
+
+fn is_constant(map: &Map, mask: &Mask) -> bool {
+    let mut mapped = map.values.iter().zip(&mask.mapped).filter(|(_, m)| **m).map(|(v, _)| *v);
+    let Some(first) = mapped.next() else { return true };
+    mapped.all(|v| v == first)
 }
 
 /// Writes `neutral.exr`, `neutral_mean.exr` and `NAME_scale.exr`, `NAME_bias.exr` into a folder that it makes.

@@ -5,14 +5,20 @@
 //! albedo texture  --chromophores--> melanin and hemoglobin maps, residual, out-of-gamut mask
 //! normal map      --normals-------> slopes, difference maps, and back
 //! another head    --transfer------> its distributions on this head's own blood
+//! strain of shapes --prediction---> distributions of a head that has none
 //! rest mesh       --occlusion-----> ambient visibility of each point
+//! all of these    --into_head-----> the maps of a head, with their provenance
 //! ```
 
 mod bvh;
 pub mod chromophores;
 pub mod hemoglobin;
+pub mod into_head;
 pub mod normals;
 pub mod occlusion;
+pub mod prediction;
+pub mod skin_texels;
+pub mod surface_warp;
 pub mod transfer;
 
 use rubor_rig::hemoglobin::HemoglobinError;

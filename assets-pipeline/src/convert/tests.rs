@@ -48,7 +48,7 @@ fn a_manifest_of_mixed_files_becomes_distributions() {
     }"#;
     std::fs::write(folder.join("maps.json"), text).unwrap();
     let manifest = hemoglobin::read_manifest(&folder.join("maps.json")).unwrap();
-    let maps = hemoglobin::convert(&manifest, &folder).unwrap();
+    let maps = hemoglobin::convert(&manifest, &folder, None).unwrap();
     assert_eq!((maps.distributions.len(), maps.clamped_texels), (3, 0));
     for d in &maps.distributions {
         // 8 bits of 0..0.32 are steps of 0.00126, a tenth of the deviation: 1 % of the scale.
@@ -76,7 +76,7 @@ fn bad_hemoglobin_input_is_explained() {
         let text = format!("{{ \"neutral\": \"n.exr\", {fields} }}");
         std::fs::write(folder.join("m.json"), text).unwrap();
         hemoglobin::read_manifest(&folder.join("m.json"))
-            .and_then(|m| hemoglobin::convert(&m, &folder))
+            .and_then(|m| hemoglobin::convert(&m, &folder, None))
             .unwrap_err()
             .to_string()
     };

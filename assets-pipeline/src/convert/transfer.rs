@@ -2,7 +2,8 @@
 //!
 //! Only relative, low-frequency statistics move: `scale` as it is, `bias` relative to the local mean of the blood.
 //! The vessels of the receiving head stay its own. Texture layouts are joined by a warp from the receiver's texture
-//! space to the giver's: identical layouts, pairs of points, or the landmarks that both heads have.
+//! space to the giver's: identical layouts, pairs of points, or the landmarks that both heads have (through the
+//! texture, here, or through space, [`super::surface_warp`]).
 
 use glam::{Vec2, Vec3};
 use nalgebra::{DMatrix, DVector};
@@ -49,6 +50,15 @@ pub enum Warp {
         weights: Vec<[f64; 2]>,
         /// Constant, u and v terms.
         affine: [[f64; 2]; 3],
+    },
+    /// A place for each texel of a map, see [`super::surface_warp`].
+    Table {
+        /// Texels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Texture coordinates on the giver.
+        places: Vec<Vec2>,
     },
 }
 
@@ -122,6 +132,10 @@ impl Warp {
                 }
                 Vec2::new(out[0] as f32, out[1] as f32)
             }
+            Self::Table { width, height, places } => {
+                let place = |t: f32, n: u32| ((t * n as f32).max(0.0) as u32).min(n - 1);
+                places[(place(uv.y, *height) * width + place(uv.x, *width)) as usize]
+            }
         }
     }
 }
@@ -169,7 +183,7 @@ fn skin_coordinate(head: &Head, at: Vec3) -> Option<Vec2> {
 }
 
 /// Barycentric weights of the point of a triangle nearest to `p`.
-fn nearest_in_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
+pub(super) fn nearest_in_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d00, d01, d11, d20, d21) = (ab.dot(ab), ab.dot(ac), ac.dot(ac), ap.dot(ab), ap.dot(ac));
     let det = d00 * d11 - d01 * d01;

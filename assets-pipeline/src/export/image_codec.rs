@@ -2,6 +2,7 @@
 
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use rubor_rig::map::Map;
 
@@ -17,6 +18,69 @@ pub enum MapEncoding {
     Png16,
     /// JPEG of this quality, 1 to 100: small, not exact.
     Jpeg(u8),
+}
+
+/// How pictures for other programs are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TextureFormat {
+    /// Exact.
+    Png,
+    /// Small; pictures with transparency stay PNG.
+    #[default]
+    Jpeg,
+    /// Exact, smaller than PNG; glTF needs `EXT_texture_webp` for it.
+    Webp,
+}
+
+impl TextureFormat {
+    /// What a file name ends in.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Jpeg => "jpg",
+            Self::Webp => "webp",
+        }
+    }
+
+    /// The format that a picture gets: JPEG has no transparency.
+    pub(crate) fn of(self, color: ExtendedColorType) -> Self {
+        if self == Self::Jpeg && color == ExtendedColorType::Rgba8 { Self::Png } else { self }
+    }
+
+    /// As in HTTP and glTF.
+    pub(crate) fn mime_type(self) -> &'static str {
+        match self {
+            Self::Png => "image/png",
+            Self::Jpeg => "image/jpeg",
+            Self::Webp => "image/webp",
+        }
+    }
+}
+
+/// Quality of JPEG pictures that only other programs use.
+const PICTURE_QUALITY: u8 = 90;
+
+/// Encodes a picture for other programs; the format may differ from the one asked for (see [`TextureFormat::of`]).
+pub(crate) fn encode_picture(
+    what: &str,
+    texels: &[u8],
+    (width, height): (u32, u32),
+    color: ExtendedColorType,
+    format: TextureFormat,
+) -> Result<(Vec<u8>, TextureFormat), ExportError> {
+    let format = format.of(color);
+    let bytes = match format {
+        TextureFormat::Png => encode_png(what, texels, width, height, color)?,
+        TextureFormat::Jpeg => encode_jpeg(what, texels, width, height, color, PICTURE_QUALITY)?,
+        TextureFormat::Webp => {
+            let mut bytes = Vec::new();
+            WebPEncoder::new_lossless(&mut bytes)
+                .write_image(texels, width, height, color)
+                .map_err(|e| ExportError::Encode { what: what.into(), reason: e.to_string() })?;
+            bytes
+        }
+    };
+    Ok((bytes, format))
 }
 
 /// An encoded image and what turns its texels back into values.

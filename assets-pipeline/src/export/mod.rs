@@ -1,13 +1,21 @@
 //! Heads to files.
 
+pub mod curves;
 pub mod gltf;
 mod image_codec;
+mod performance;
+mod pictures;
+pub mod skin_color;
+pub mod usd;
 
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use crate::error::ExportError;
+
+pub use self::image_codec::TextureFormat;
+pub use self::performance::{Performance, top_shapes};
 
 /// Writes to a temporary name beside the file and renames, so that a killed run leaves no half file.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {

@@ -22,6 +22,8 @@ pub(super) struct Built {
     /// Blend shape node and index of each weight, with the shape that it drives.
     pub(super) weights: Vec<(NodeId, u32, String)>,
     pub(super) meshes: Vec<NodeId>,
+    /// The rig file that this crate wrote.
+    pub(super) rig: Option<serde_json::Value>,
     /// Transform that carries what this crate wrote: it is the motion of the head, not its place.
     pub(super) carrier: Option<NodeId>,
 }
@@ -381,7 +383,9 @@ impl Assembly<'_> {
             BlendShape { name, points, offsets }
         };
         head.shapes = self.shapes.into_iter().map(shape).collect();
+        let mut rig = None;
         if let Some(appearance) = self.appearance {
+            rig = appearance.rig.clone();
             head.maps = appearance.load_maps(folder, notes);
             head.name = appearance.name;
             head.landmarks = appearance.landmarks;
@@ -390,7 +394,7 @@ impl Assembly<'_> {
                 head.mesh.occlusion = appearance.occlusion;
             }
         }
-        Built { head, inbetweens: self.inbetweens, weights: self.weights, meshes, carrier }
+        Built { head, inbetweens: self.inbetweens, weights: self.weights, meshes, rig, carrier }
     }
 }
 

@@ -30,6 +30,8 @@ pub struct Imported {
     pub sequence: Option<Sequence>,
     /// In-between targets: their shapes stand in the head, a rig needs these entries.
     pub inbetweens: Vec<Inbetween>,
+    /// The rig file that a scene of ours carries.
+    pub rig: Option<serde_json::Value>,
     /// What was left out, and why.
     pub notes: Vec<String>,
 }
@@ -55,5 +57,5 @@ pub fn from_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result<Import
     let built = head::build(&scene, options, &name, &folder, &mut notes).map_err(|fault| fault.of(path))?;
     built.head.validate()?;
     let sequence = motion::sequence(&scene, &built, &mut notes);
-    Ok(Imported { head: built.head, sequence, inbetweens: built.inbetweens, notes })
+    Ok(Imported { head: built.head, sequence, inbetweens: built.inbetweens, rig: built.rig, notes })
 }

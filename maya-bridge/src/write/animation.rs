@@ -107,6 +107,11 @@ impl Animation {
         self.skin = names.zip(&skin).map(|(name, values)| (name, keyed(values, fps))).collect();
     }
 
+    /// True where something gives a shape a weight.
+    pub(super) fn moves(&self, shape: usize) -> bool {
+        self.weights.get(&shape).is_some_and(|track| *track != Track::Constant(0.0))
+    }
+
     /// Constant weight of each target, 0 where there is none or a curve.
     pub(super) fn rest_weights(&self, targets: &Targets) -> Vec<f32> {
         let weight = |shape: &usize| match self.weights.get(shape) {

@@ -20,21 +20,14 @@ use std::path::{Path, PathBuf};
 use image::RgbImage;
 use rubor_rig::expression::{Inbetween, Rig};
 use rubor_rig::head::Head;
-use rubor_rig::timeline::Sequence;
 
+use self::animation::Animation;
 use crate::appearance::Appearance;
 use crate::ascii::lexer::quoted;
 use crate::error::WriteError;
 use crate::plain_name;
 
-/// A performance to write with the head.
-#[derive(Clone, Copy, Debug)]
-pub struct Performance<'a> {
-    /// Expressions and states of the sequence are looked up here.
-    pub rig: &'a Rig,
-    /// What happens.
-    pub sequence: &'a Sequence,
-}
+pub use rubor_assets::export::Performance;
 
 /// What to write beside the geometry.
 #[derive(Clone, Debug, Default)]
@@ -43,6 +36,8 @@ pub struct Options {
     pub base_color: Option<RgbImage>,
     /// Shapes that are in-betweens of others.
     pub inbetweens: Vec<Inbetween>,
+    /// Carried along as text: expressions and combination shapes have no nodes here.
+    pub rig: Option<Rig>,
 }
 
 /// A scene and the files beside it.
@@ -99,16 +94,15 @@ pub fn to_scene(
     head.validate()?;
     let encode = |(what, reason)| WriteError::Encode { what, reason };
     let mut scene = Scene::default();
-    let (appearance, files) = Appearance::of(head, stem).map_err(encode)?;
+    let (mut appearance, files) = Appearance::of(head, stem).map_err(encode)?;
+    if let Some(rig) = &options.rig {
+        let json = serde_json::to_value(rig);
+        appearance.rig =
+            Some(json.map_err(|e| WriteError::Encode { what: "rig".into(), reason: e.to_string() })?);
+    }
     scene.files = files;
-    let baked = performance.is_some_and(|p| animation::needs_bake(head, p));
-    // Baked weights already hold the shares of in-betweens: then each is a target of its own.
-    let inbetweens = if baked { &[][..] } else { &options.inbetweens[..] };
+    let (animation, inbetweens) = animate(head, performance, &options.inbetweens, &mut scene.notes)?;
     let targets = mesh::Targets::new(head, inbetweens, &mut scene.notes);
-    let animation = match performance {
-        Some(performance) => Some(animation::Animation::new(head, performance, baked, &mut scene.notes)?),
-        None => None,
-    };
     let fps = performance.map_or(24.0, |p| p.sequence.fps);
     let (unit, unit_fps) = animation::time_unit(fps, &mut scene.notes);
 
@@ -138,6 +132,34 @@ pub fn to_scene(
     }
     mesh::connect(out, head);
     Ok(scene)
+}
+
+/// Curves, and the in-betweens that stay in-betweens: Maya shares their weights out itself. Those that the performance
+/// also moves by themselves become targets of their own, all shares in the weights.
+fn animate<'a>(
+    head: &Head,
+    performance: Option<Performance<'_>>,
+    inbetweens: &'a [Inbetween],
+    notes: &mut Vec<String>,
+) -> Result<(Option<Animation>, &'a [Inbetween]), WriteError> {
+    let Some(performance) = performance else { return Ok((None, inbetweens)) };
+    let rest = performance.rig.inbetweens.iter().filter(|i| !inbetweens.contains(i)).cloned().collect();
+    let rig = Rig { inbetweens: rest, ..performance.rig.clone() };
+    let unshared = Performance { rig: &rig, sequence: performance.sequence };
+    let baked = animation::needs_bake(head, performance);
+    let mut said = Vec::new();
+    let animation = Animation::new(head, unshared, baked, &mut said)?;
+    let by_itself =
+        inbetweens.iter().find(|i| head.shape_index(&i.target).is_some_and(|s| animation.moves(s)));
+    if let Some(inbetween) = by_itself {
+        notes.push(format!(
+            "{:?} is an in-between and moves by itself: in-betweens are targets, their shares in the weights",
+            inbetween.target
+        ));
+        return Ok((Some(Animation::new(head, performance, true, notes)?), &[]));
+    }
+    notes.append(&mut said);
+    Ok((Some(animation), inbetweens))
 }
 
 fn line(out: &mut String, text: &str) {

@@ -92,20 +92,18 @@ pub fn scale_and_bias(
         });
     }
     let covered = neutral.covered.and(&target.covered);
-    let mut scale = Map { values: Vec::new(), ..neutral.mean.clone() };
-    scale.values = (0..covered.mapped.len())
-        .into_par_iter()
-        .map(|i| {
-            if !covered.mapped[i] {
-                return 1.0;
-            }
-            let floor =
-                RELATIVE_FLOOR * f64::from(neutral.mean.values[i].abs()) + f64::from(f32::MIN_POSITIVE);
-            let ratio = (f64::from(target.deviation.values[i]) + floor)
-                / (f64::from(neutral.deviation.values[i]) + floor);
-            (ratio as f32).min(MAX_SCALE)
-        })
-        .collect();
+    let ratio = |i: usize| {
+        if !covered.mapped[i] {
+            return 1.0;
+        }
+        let floor = RELATIVE_FLOOR * f64::from(neutral.mean.values[i].abs()) + f64::from(f32::MIN_POSITIVE);
+        let ratio = (f64::from(target.deviation.values[i]) + floor)
+            / (f64::from(neutral.deviation.values[i]) + floor);
+        (ratio as f32).min(MAX_SCALE)
+    };
+    let values = (0..covered.mapped.len()).into_par_iter().map(ratio).collect();
+    let (width, height) = size(neutral);
+    let scale = Map { width, height, channels: 1, values };
     Ok((scale, target.mean.clone(), covered))
 }
 

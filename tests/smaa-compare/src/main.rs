@@ -8,7 +8,7 @@
 
 use rubor_renderer::{Gpu, PassTimer};
 use rubor_renderer::antialias::{
-    Antialias, BlendSpace, Filter, reference::Picture, DiagonalEdges, Dispatch, History, Inputs, Mode, Preset, Settings,
+    Antialias, BlendSpace, Filter, reference::Picture, Dispatch, History, Inputs, Mode, Preset, Settings,
 };
 use std::time::Instant;
 use wgpu::{TextureFormat, TextureUsages};
@@ -68,8 +68,7 @@ fn main() -> Result<()> {
 fn as_published() -> Settings {
     Settings {
         blend_space: BlendSpace::Stored,
-        diagonal_edges: DiagonalEdges::Published,
-        ..Settings::new(Mode::Smaa1x, Preset::High)
+        ..Settings::published(Mode::Smaa1x, Preset::High)
     }
 }
 

@@ -2,88 +2,120 @@
 //! [`crate::facial_appearance`].
 //!
 //! ```text
-//! Head --> one mesh, one primitive a part: POSITION NORMAL TANGENT TEXCOORD_0, sparse morph targets
-//!      --> materials for other viewers: baked base colour, normal map, eyes, teeth, lashes
-//!      --> RUBOR_facial_appearance: points, occlusion, landmarks, maps, provenance, rig
-//! frames --> one animation: weights, rotation and translation of the node
+//! Head --geometry---> one mesh, one primitive a part: POSITION NORMAL TANGENT TEXCOORD_0, sparse morph targets
+//!      --materials--> for other viewers: baked base colour, normal map, eyes, teeth, lashes
+//!      --maps-------> RUBOR_facial_appearance: points, occlusion, landmarks, maps, provenance, rig, sequence
+//! Rig  --skin_color-> COLOR_0 of the skin and of its morph targets: the colour that belongs to each shape
+//! Sequence --curves-> one animation: weights, rotation and translation of the node
 //! ```
 //!
-//! Geometry is stored bit for bit; maps are quantised as [`MapEncodings`] says.
+//! Geometry is stored bit for bit; maps are quantised as [`MapEncodings`] says; curves stay within
+//! [`Options::tolerance`].
 
+mod animation;
 mod buffer;
+mod geometry;
 mod maps;
 mod materials;
 
-use std::collections::HashMap;
 use std::path::Path;
 
-use glam::{Quat, Vec3};
-use rubor_rig::deform::{deform_points, point_normals, vertex_tangents};
-use rubor_rig::head::{BlendShape, Head};
-use serde_json::{Value, json};
+use rubor_rig::expression::Rig;
+use rubor_rig::face_state::FaceState;
+use rubor_rig::head::Head;
+use rubor_rig::names::action_units;
+use rubor_rig::timeline::Sequence;
+use serde_json::{Map, Value, json};
 
-use self::buffer::{Buffer, Target};
+use self::buffer::Buffer;
 pub use self::maps::MapEncodings;
 pub use super::image_codec::MapEncoding;
+use super::performance::{Performance, PerformanceCurves};
+use super::skin_color::shape_colors;
+use super::{TextureFormat, write_whole};
 use crate::error::ExportError;
-use crate::facial_appearance::{FacialAppearance, NAME, PartEntry, VERSION};
+use crate::facial_appearance::{FacialAppearance, NAME, VERSION};
 
 /// What goes into the file beside the head.
 #[derive(Clone, Debug)]
-pub struct Options {
-    /// Base colour of the skin (sRGB), baked by the caller from the neutral chromophores; stored as JPEG.
-    pub base_color: Option<image::RgbImage>,
-    /// Side of the normal map for other viewers, made from the slopes; 0 leaves it out.
+pub struct Options<'a> {
+    /// Largest side of the skin's base colour, which is baked from the chromophores; 0 leaves it out.
+    pub color_map_size: u32,
+    /// Largest side of the normal map for other viewers, made from the slopes; 0 leaves it out.
     pub normal_map_size: u32,
+    /// The pose whose blood and wrinkles are baked into these two, and whose weights the mesh rests in; none: neutral.
+    pub pose: Option<FaceState>,
+    /// How pictures for other viewers are stored.
+    pub textures: TextureFormat,
     /// Morph targets carry normals too: other viewers light deformed faces better, the file grows by about half.
     pub morph_normals: bool,
+    /// Morph targets carry colours: viewers that do not know the extension show some of the change of colour.
+    pub shape_colors: bool,
     /// How maps are stored.
     pub maps: MapEncodings,
-    /// The rig file, carried along.
-    pub rig: Option<Value>,
-    /// Frames of an animation; none if empty. Times in seconds, strictly increasing.
-    pub frames: Vec<Frame>,
+    /// Only these shapes of the head, by rising index; none: all.
+    pub shapes: Option<Vec<usize>>,
+    /// The rig, carried along; a performance and colours of shapes need it.
+    pub rig: Option<&'a Rig>,
+    /// The performance, as an animation and carried along as it is written.
+    pub sequence: Option<&'a Sequence>,
+    /// How far weights of the animation may be from the performance; a rotation a quarter of that in each component, a
+    /// translation that part of the head's height. 0 leaves out no authored key.
+    pub tolerance: f32,
 }
 
-impl Default for Options {
+impl Default for Options<'_> {
     fn default() -> Self {
         Self {
-            base_color: None,
+            color_map_size: 2048,
             normal_map_size: 1024,
+            pose: None,
+            textures: TextureFormat::default(),
             morph_normals: true,
+            shape_colors: false,
             maps: MapEncodings::default(),
+            shapes: None,
             rig: None,
-            frames: Vec::new(),
+            sequence: None,
+            tolerance: 1e-5,
         }
     }
 }
 
-/// One moment of an animation.
+/// A file in memory.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
-    /// Seconds.
-    pub time_s: f32,
-    /// Weight of each shape of the head.
-    pub weights: Vec<f32>,
-    /// Rotation of the head about the origin.
-    pub rotation: Quat,
-    /// Translation after the rotation, metres.
-    pub translation: Vec3,
+pub struct Exported {
+    /// The `.glb`.
+    pub bytes: Vec<u8>,
+    /// What has no effect, or could not be kept as it was.
+    pub notes: Vec<String>,
+    /// Keys of the animation.
+    pub keys: usize,
 }
 
 /// Writes the file: to a temporary name, then renamed.
 ///
 /// # Errors
-/// An invalid head, frames that do not fit it, images that cannot be encoded, a file that cannot be written.
-pub fn write(head: &Head, options: &Options, path: &Path) -> Result<(), ExportError> {
-    super::write_whole(path, &to_bytes(head, options)?)
+/// As [`export()`], and a file that cannot be written.
+pub fn write(head: &Head, options: &Options<'_>, path: &Path) -> Result<Exported, ExportError> {
+    let exported = export(head, options)?;
+    write_whole(path, &exported.bytes)?;
+    Ok(exported)
 }
 
-/// The bytes of the `.glb`.
+/// The bytes of the `.glb` alone.
 ///
 /// # Errors
-/// As [`write()`], without the file.
-pub fn to_bytes(head: &Head, options: &Options) -> Result<Vec<u8>, ExportError> {
+/// As [`export()`].
+pub fn to_bytes(head: &Head, options: &Options<'_>) -> Result<Vec<u8>, ExportError> {
+    export(head, options).map(|exported| exported.bytes)
+}
+
+/// The `.glb` and what there is to say about it.
+///
+/// # Errors
+/// An invalid head, a rig or sequence that does not fit it, images that cannot be encoded.
+pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportError> {
     head.validate()?;
     if head.mesh.triangles.is_empty() {
         return Err(ExportError::Content {
@@ -92,13 +124,23 @@ pub fn to_bytes(head: &Head, options: &Options) -> Result<Vec<u8>, ExportError> 
             expected: "a mesh".into(),
         });
     }
-    check_frames(head, &options.frames)?;
+    let kept = kept_shapes(head, options)?;
+    let mut notes = Vec::new();
     let mut buffer = Buffer::default();
-    let (primitives, parts) = primitives(head, options.morph_normals, &mut buffer);
-    let materials = materials::write(head, options, &mut buffer)?;
+    // Baked colours belong to one pose: changes on top of them would count twice.
+    let colors = match options.rig {
+        Some(rig) if options.shape_colors && options.pose.is_none() => shape_colors(head, rig)?,
+        _ => None,
+    };
+    let (primitives, parts) =
+        geometry::primitives(head, &kept, options.morph_normals, colors.as_ref(), &mut buffer);
+    let factor = colors.as_ref().map_or(1.0, |c| 1.0 / c.rest);
+    let materials = materials::write(head, options, factor, &mut buffer)?;
     let maps = maps::write(&head.maps, &options.maps, &mut buffer)?;
     let occlusion = (!head.mesh.occlusion.is_empty()).then(|| buffer.normalized(&head.mesh.occlusion) as u32);
-
+    let as_json = |what: &str, value: Result<Value, serde_json::Error>| {
+        value.map_err(|e| ExportError::Encode { what: what.into(), reason: e.to_string() })
+    };
     let extension = FacialAppearance {
         version: VERSION,
         name: head.name.clone(),
@@ -109,13 +151,19 @@ pub fn to_bytes(head: &Head, options: &Options) -> Result<Vec<u8>, ExportError> 
         landmarks: head.landmarks.iter().map(|(name, p)| (name.clone(), p.to_array())).collect(),
         maps,
         provenance: head.provenance.clone(),
-        rig: options.rig.clone(),
+        rig: options.rig.map(|rig| as_json("rig", serde_json::to_value(rig))).transpose()?,
+        sequence: options.sequence.map(|s| as_json("sequence", serde_json::to_value(s))).transpose()?,
     };
-    let names: Vec<&str> = head.shapes.iter().map(|s| s.name.as_str()).collect();
+    let names: Vec<&str> = kept.iter().map(|s| head.shapes[*s].name.as_str()).collect();
     let mut mesh = json!({"name": head.name, "primitives": primitives});
     if !names.is_empty() {
-        mesh["extras"] = json!({"targetNames": names});
-        mesh["weights"] = json!(vec![0.0; names.len()]);
+        let units: Map<String, Value> = (names.iter())
+            .filter(|n| !action_units(n).is_empty())
+            .map(|n| ((*n).to_owned(), json!(action_units(n))))
+            .collect();
+        mesh["extras"] = json!({"targetNames": names, "actionUnits": units});
+        let rest = |s: &usize| options.pose.as_ref().and_then(|p| p.shapes.get(*s)).copied().unwrap_or(0.0);
+        mesh["weights"] = json!(kept.iter().map(rest).collect::<Vec<f32>>());
     }
     let mut document = json!({
         "asset": {"version": "2.0", "generator": concat!("rubor ", env!("CARGO_PKG_VERSION"))},
@@ -127,136 +175,44 @@ pub fn to_bytes(head: &Head, options: &Options) -> Result<Vec<u8>, ExportError> 
         "extensions": {NAME: extension},
     });
     materials.put_into(&mut document);
-    if !options.frames.is_empty() {
-        document["animations"] = json!([animation(head, &options.frames, &mut buffer)]);
+    let mut keys = 0;
+    if let (Some(rig), Some(sequence)) = (options.rig, options.sequence) {
+        let evaluator = Performance { rig, sequence }.evaluator(head, &mut notes)?;
+        let height = head.height().max(f32::MIN_POSITIVE);
+        let curves = PerformanceCurves::new(&evaluator, &kept, height, options.tolerance);
+        if let Some(animation) = animation::write(&curves, &mut buffer) {
+            document["animations"] = json!([animation]);
+            keys =
+                [&curves.weights, &curves.rotation, &curves.translation].iter().map(|c| c.keys.len()).sum();
+        }
+        note_baked(rig, head, &mut notes);
     }
-    Ok(buffer.finish(document))
+    Ok(Exported { bytes: buffer.finish(document), notes, keys })
 }
 
-/// One primitive a part with vertices of its own (viewers keep morph targets per primitive, so sharing all vertices among
-/// parts would multiply them), and which points they are.
-fn primitives(head: &Head, morph_normals: bool, buffer: &mut Buffer) -> (Vec<Value>, Vec<PartEntry>) {
-    let mesh = &head.mesh;
-    let normals = point_normals(mesh, &mesh.points);
-    let tangents = vertex_tangents(mesh, &mesh.points, &normals);
-    let turned: Vec<Vec<(u32, Vec3)>> =
-        head.shapes.iter().filter(|_| morph_normals).map(|s| normal_offsets(head, s, &normals)).collect();
-    let mut primitives = Vec::new();
-    let mut entries = Vec::new();
-    for (material, part) in mesh.parts.iter().enumerate() {
-        let mut local: HashMap<u32, u32> = HashMap::new();
-        let mut vertices: Vec<u32> = Vec::new();
-        let triangles = &mesh.triangles[part.triangles.start as usize..part.triangles.end as usize];
-        let indices: Vec<u32> = triangles
-            .as_flattened()
-            .iter()
-            .map(|v| {
-                *local.entry(*v).or_insert_with(|| {
-                    vertices.push(*v);
-                    vertices.len() as u32 - 1
-                })
-            })
-            .collect();
-        let points: Vec<u32> = vertices.iter().map(|v| mesh.vertices[*v as usize].point).collect();
-        let at = |list: &[Vec3]| -> Vec<[f32; 3]> {
-            points.iter().map(|p| list[*p as usize].to_array()).collect()
-        };
-        let uvs: Vec<[f32; 2]> = vertices.iter().map(|v| mesh.vertices[*v as usize].uv.to_array()).collect();
-        let tangents: Vec<[f32; 4]> = vertices.iter().map(|v| tangents[*v as usize].to_array()).collect();
-        let mut vertices_of: HashMap<u32, Vec<u32>> = HashMap::new();
-        points.iter().enumerate().for_each(|(v, p)| vertices_of.entry(*p).or_default().push(v as u32));
-        let to_vertices = |moved: &mut dyn Iterator<Item = (u32, Vec3)>| {
-            let mut moved: Vec<(u32, Vec3)> = moved
-                .flat_map(|(p, d)| vertices_of.get(&p).into_iter().flatten().map(move |v| (*v, d)))
-                .collect();
-            moved.sort_unstable_by_key(|(v, _)| *v);
-            moved
-        };
-        let mut primitive = json!({
-            "attributes": {
-                "POSITION": buffer.floats(&at(&mesh.points), Target::Vertices, true),
-                "NORMAL": buffer.floats(&at(&normals), Target::Vertices, false),
-                "TANGENT": buffer.floats(&tangents, Target::Vertices, false),
-                "TEXCOORD_0": buffer.floats(&uvs, Target::Vertices, false),
-            },
-            "indices": buffer.indices(&indices, vertices.len(), Target::Indices),
-            "material": material,
+fn kept_shapes(head: &Head, options: &Options<'_>) -> Result<Vec<usize>, ExportError> {
+    let Some(kept) = &options.shapes else { return Ok((0..head.shapes.len()).collect()) };
+    if kept.windows(2).any(|w| w[0] >= w[1]) || kept.last().is_some_and(|s| *s >= head.shapes.len()) {
+        return Err(ExportError::Content {
+            at: "shapes".into(),
+            found: format!("{kept:?}"),
+            expected: format!("rising indices below {}", head.shapes.len()),
         });
-        // Every target must be there on every primitive; those that do not move it share one empty accessor.
-        let mut still = None;
-        let mut targets = Vec::new();
-        for (i, shape) in head.shapes.iter().enumerate() {
-            let offsets = to_vertices(&mut shape.points.iter().copied().zip(shape.offsets.iter().copied()));
-            let mut put = |moved: &[(u32, Vec3)]| match buffer.displacements(vertices.len(), moved) {
-                Some(accessor) => accessor,
-                None => *still.get_or_insert_with(|| buffer.zeros(vertices.len())),
-            };
-            let mut target = json!({"POSITION": put(&offsets)});
-            if let Some(turned) = turned.get(i) {
-                target["NORMAL"] = json!(put(&to_vertices(&mut turned.iter().copied())));
-            }
-            targets.push(target);
-        }
-        if !targets.is_empty() {
-            primitive["targets"] = json!(targets);
-        }
-        primitives.push(primitive);
-        let points = buffer.indices(&points, mesh.points.len(), Target::None) as u32;
-        entries.push(PartEntry { name: part.name.clone(), material: part.material, points });
     }
-    (primitives, entries)
+    Ok(kept.clone())
 }
 
-/// Change of each normal at weight 1, where it exceeds about a sixteenth of a degree.
-fn normal_offsets(head: &Head, shape: &BlendShape, rest: &[Vec3]) -> Vec<(u32, Vec3)> {
-    let points = deform_points(&head.mesh, std::slice::from_ref(shape), &[1.0]);
-    let turned = point_normals(&head.mesh, &points);
-    (turned.iter().zip(rest).enumerate())
-        .map(|(i, (n, n0))| (i as u32, *n - *n0))
-        .filter(|(_, d)| d.length() > 1e-3)
-        .collect()
-}
-
-fn check_frames(head: &Head, frames: &[Frame]) -> Result<(), ExportError> {
-    let fail = |i: usize, found: String, expected: String| {
-        Err(ExportError::Content { at: format!("frame {i}"), found, expected })
-    };
-    for (i, frame) in frames.iter().enumerate() {
-        if frame.weights.len() != head.shapes.len() {
-            let expected = format!("one for each of the {} shapes", head.shapes.len());
-            return fail(i, format!("{} weights", frame.weights.len()), expected);
-        }
-        let finite = frame.weights.iter().all(|w| w.is_finite())
-            && frame.rotation.is_finite()
-            && frame.translation.is_finite();
-        if !finite {
-            return fail(i, "a number that is not finite".into(), "finite weights and motion".into());
-        }
-        if frame.time_s.is_nan() || frame.time_s < 0.0 || (i > 0 && frame.time_s <= frames[i - 1].time_s) {
-            return fail(i, format!("time {} s", frame.time_s), "strictly increasing times from 0".into());
+/// glTF's morph targets are sums: what drives a shape by others is in the weights of the animation.
+fn note_baked(rig: &Rig, head: &Head, notes: &mut Vec<String>) {
+    let on_head = |name: &String| !rubor_rig::names::Resolver::shapes(head).resolve(name).is_empty();
+    let inbetweens = rig.inbetweens.iter().filter(|i| on_head(&i.shape) && on_head(&i.target)).count();
+    let combinations = rig.combinations.iter().filter(|c| on_head(&c.shape)).count();
+    for (count, what) in [(inbetweens, "in-between"), (combinations, "combination shape")] {
+        if count > 0 {
+            let s = if count == 1 { "" } else { "s" };
+            notes.push(format!(
+                "glTF has no {what}s: {count} {what}{s} baked into the weights of the animation (kept as written in {NAME})"
+            ));
         }
     }
-    Ok(())
-}
-
-/// Weights, rotation and translation of node 0, linear between frames.
-fn animation(head: &Head, frames: &[Frame], buffer: &mut Buffer) -> Value {
-    let times: Vec<[f32; 1]> = frames.iter().map(|f| [f.time_s]).collect();
-    let rotations: Vec<[f32; 4]> = frames.iter().map(|f| f.rotation.normalize().to_array()).collect();
-    let translations: Vec<[f32; 3]> = frames.iter().map(|f| f.translation.to_array()).collect();
-    let input = buffer.floats(&times, Target::None, true);
-    let mut tracks = vec![
-        ("rotation", buffer.floats(&rotations, Target::None, false)),
-        ("translation", buffer.floats(&translations, Target::None, false)),
-    ];
-    if !head.shapes.is_empty() {
-        let weights: Vec<[f32; 1]> = frames.iter().flat_map(|f| &f.weights).map(|w| [*w]).collect();
-        tracks.push(("weights", buffer.floats(&weights, Target::None, false)));
-    }
-    let samplers: Vec<Value> =
-        tracks.iter().map(|(_, output)| json!({"input": input, "output": output})).collect();
-    let channels: Vec<Value> = (tracks.iter().enumerate())
-        .map(|(i, (path, _))| json!({"sampler": i, "target": {"node": 0, "path": path}}))
-        .collect();
-    json!({"name": "performance", "samplers": samplers, "channels": channels})
 }

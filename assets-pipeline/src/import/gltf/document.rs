@@ -4,9 +4,24 @@ use std::borrow::Cow;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use gltf_json::validation::Checked;
+use gltf_json::validation::{Checked, Error, Validate};
 
 use crate::error::ImportError;
+use crate::facial_appearance::NAME;
+
+/// Extensions that change nothing about what is read here, or only how a number is stored.
+const UNDERSTOOD: [&str; 8] = [
+    NAME,
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_texture_basisu",
+    "KHR_lights_punctual",
+    "KHR_animation_pointer",
+    "EXT_texture_webp",
+    "MSFT_texture_dds",
+];
+/// The same for all extensions of these families: materials, VRM's avatars, metadata.
+const UNDERSTOOD_FAMILIES: [&str; 4] = ["KHR_materials_", "VRM", "KHR_xmp", "ADOBE_materials_"];
 
 /// Document, buffers, and the path for messages.
 pub(super) struct Document {
@@ -22,9 +37,12 @@ impl Document {
             ImportError::content(path, "document", e.to_string(), "a valid glTF 2.0 document")
         };
         let parsed = gltf::Gltf::from_slice_without_validation(bytes).map_err(invalid)?;
-        let json = parsed.document.into_json();
+        let mut json = parsed.document.into_json();
+        check_extensions(&json, path)?;
+        json.extensions_required.clear();
         check_positions(&json, path)?;
-        let validated = gltf::Document::from_json(json).map_err(invalid)?;
+        check_indices(&json, path)?;
+        let validated = gltf::Document::from_json_without_validation(json);
         let mut document = Self { gltf: validated, buffers: Vec::new(), path: path.to_owned() };
         let mut blob = parsed.blob;
         let mut buffers = Vec::new();
@@ -133,6 +151,55 @@ fn check_glb_length(bytes: &[u8], path: &Path) -> Result<(), ImportError> {
             let expected =
                 stated.map_or("a header of 12 bytes".into(), |l| format!("{l} bytes as its header states"));
             Err(ImportError::content(path, "GLB header", format!("{} bytes", bytes.len()), expected))
+        }
+    }
+}
+
+/// What a file requires must be understood; compressed geometry is refused in words.
+fn check_extensions(json: &gltf_json::Root, path: &Path) -> Result<(), ImportError> {
+    for (i, name) in json.extensions_required.iter().enumerate() {
+        let known = UNDERSTOOD.contains(&name.as_str())
+            || UNDERSTOOD_FAMILIES.iter().any(|family| name.starts_with(family));
+        if known {
+            continue;
+        }
+        let expected = match name.as_str() {
+            "KHR_draco_mesh_compression" => {
+                "geometry without Draco compression: export it so, or decompress it with `gltf-transform copy`"
+            }
+            "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+                "buffers without meshopt compression: export them so, or decompress them with `gltf-transform copy`"
+            }
+            _ => "an extension that rubor understands",
+        };
+        let found = format!("the required extension {name:?}");
+        return Err(ImportError::content(path, format!("extensionsRequired {i}"), found, expected));
+    }
+    Ok(())
+}
+
+/// The checks of the `gltf` crate, without which it panics, but for one: accessors without data are zeros in glTF 2.0,
+/// the crate refuses them.
+fn check_indices(json: &gltf_json::Root, path: &Path) -> Result<(), ImportError> {
+    let mut fault: Option<(String, Error)> = None;
+    json.validate(json, gltf_json::Path::new, &mut |place, error| {
+        let place = place().to_string();
+        let zeros =
+            error == Error::Missing && place.starts_with("accessors") && place.ends_with("bufferView");
+        if !zeros && fault.is_none() {
+            fault = Some((place, error));
+        }
+    });
+    match fault {
+        None => Ok(()),
+        Some((place, error)) => {
+            let (found, expected) = match error {
+                Error::IndexOutOfBounds => ("an index of something that is not there", "an existing one"),
+                Error::Missing => ("nothing", "a value, which glTF 2.0 requires"),
+                Error::Oversize => ("a size beyond this machine's", "a smaller one"),
+                _ => ("a value that glTF 2.0 does not allow", "a valid one"),
+            };
+            Err(ImportError::content(path, place, found, expected))
         }
     }
 }

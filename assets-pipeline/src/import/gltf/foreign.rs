@@ -1,6 +1,6 @@
 //! Files of other programs: every mesh of the scene, its morph targets by name.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
@@ -9,6 +9,7 @@ use rubor_rig::head::{BlendShape, Head, Part, Vertex};
 
 use super::accessor;
 use super::document::Document;
+use super::placement::Placement;
 use crate::error::ImportError;
 use crate::import::materials::guess_material;
 
@@ -21,8 +22,12 @@ struct Builder {
     /// Shape names in order of first use, and offsets by point.
     shapes: Vec<(String, BTreeMap<u32, Vec3>)>,
     points: HashMap<WeldKey, u32>,
-    nodes: HashSet<usize>,
+    /// World transform of every node of the scene.
+    world: HashMap<usize, Mat4>,
 }
+
+/// A tree of nodes is not deeper than this.
+const MOST_LEVELS: usize = 512;
 
 pub(super) fn read(document: &Document) -> Result<Head, ImportError> {
     let mut builder = Builder::default();
@@ -31,12 +36,13 @@ pub(super) fn read(document: &Document) -> Result<Head, ImportError> {
         Some(scene) => {
             builder.head.name = scene.name().unwrap_or_default().to_owned();
             for node in scene.nodes() {
-                builder.node(document, &node, Mat4::IDENTITY)?;
+                builder.node(document, &node, Mat4::IDENTITY, 0)?;
             }
+            builder.meshes(document, scene.nodes())?;
         }
         None => {
             for mesh in document.gltf.meshes() {
-                builder.mesh(document, &mesh, Mat4::IDENTITY)?;
+                builder.mesh(document, &mesh, &Placement::Rigid(Mat4::IDENTITY))?;
             }
         }
     }
@@ -69,22 +75,55 @@ pub(super) fn target_names(mesh: &Mesh<'_>) -> Vec<String> {
 }
 
 impl Builder {
-    fn node(&mut self, document: &Document, node: &Node<'_>, parent: Mat4) -> Result<(), ImportError> {
+    /// Transforms of a node and all below it.
+    fn node(
+        &mut self,
+        document: &Document,
+        node: &Node<'_>,
+        parent: Mat4,
+        level: usize,
+    ) -> Result<(), ImportError> {
         let at = format!("node {}", node.index());
-        if !self.nodes.insert(node.index()) {
+        if self.world.contains_key(&node.index()) {
             return Err(document.fail(&at, "more than one way to it", "a tree of nodes"));
+        }
+        if level >= MOST_LEVELS {
+            return Err(document.fail(
+                &at,
+                "a deeper tree",
+                format!("at most {MOST_LEVELS} levels of nodes"),
+            ));
         }
         let world_from_node = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
         if !world_from_node.is_finite() {
             return Err(document.fail(&at, "a transform that is not finite", "finite numbers"));
         }
-        if let Some(mesh) = node.mesh() {
-            self.mesh(document, &mesh, world_from_node)?;
-        }
-        node.children().try_for_each(|child| self.node(document, &child, world_from_node))
+        self.world.insert(node.index(), world_from_node);
+        node.children().try_for_each(|child| self.node(document, &child, world_from_node, level + 1))
     }
 
-    fn mesh(&mut self, document: &Document, mesh: &Mesh<'_>, world: Mat4) -> Result<(), ImportError> {
+    /// Meshes of nodes, depth first; joints may stand anywhere, so all transforms are known before.
+    fn meshes<'a>(
+        &mut self,
+        document: &Document,
+        nodes: impl Iterator<Item = Node<'a>>,
+    ) -> Result<(), ImportError> {
+        for node in nodes {
+            if let Some(mesh) = node.mesh() {
+                let placement = Placement::of(document, &node, &self.world)?;
+                self.mesh(document, &mesh, &placement)?;
+            }
+            self.meshes(document, node.children())?;
+        }
+        Ok(())
+    }
+
+    fn mesh(
+        &mut self,
+        document: &Document,
+        mesh: &Mesh<'_>,
+        placement: &Placement,
+    ) -> Result<(), ImportError> {
         let names = target_names(mesh);
         for (i, primitive) in mesh.primitives().enumerate() {
             let at = |what: &str| format!("mesh {}, primitive {i}, {what}", mesh.index());
@@ -133,13 +172,14 @@ impl Builder {
             let Some(mut triangles) = triangles(&indices, primitive.mode()) else {
                 continue; // points and lines are no surface
             };
-            if world.determinant() < 0.0 {
+            let worlds = placement.of_vertices(document, &at(""), &primitive, count)?;
+            if worlds.at(0).determinant() < 0.0 {
                 triangles.iter_mut().for_each(|t| t.swap(1, 2));
             }
             let first = self.head.mesh.vertices.len() as u32;
             let slots: Vec<usize> = names.iter().map(|n| self.shape_slot(n)).collect();
             for v in 0..count {
-                let point = self.weld(world, positions[v], normals[v], &slots, &targets, v);
+                let point = self.weld(worlds.at(v), positions[v], normals[v], &slots, &targets, v);
                 self.head.mesh.vertices.push(Vertex { point, uv: Vec2::from_array(uvs[v]) });
             }
             let start = self.head.mesh.triangles.len() as u32;

@@ -11,14 +11,19 @@
 mod accessor;
 mod document;
 mod foreign;
+mod lint;
+mod motion;
 mod own;
+mod placement;
 
 use std::fs;
 use std::path::Path;
 
 use rubor_rig::head::Head;
+use rubor_rig::timeline::Sequence;
 
 use self::document::Document;
+pub use self::lint::lint;
 use crate::error::ImportError;
 use crate::facial_appearance::NAME;
 
@@ -29,6 +34,10 @@ pub struct ImportedHead {
     pub head: Head,
     /// The rig file that the head carries.
     pub rig: Option<serde_json::Value>,
+    /// The sequence file that its animation was made from.
+    pub sequence: Option<serde_json::Value>,
+    /// Its first animation as tracks: what other programs keyed.
+    pub animation: Option<Sequence>,
 }
 
 /// Reads a `.glb` or `.gltf`. Buffers and images may be in the file, in data URIs, or in files of the same folder or
@@ -47,10 +56,11 @@ pub fn read(path: &Path) -> Result<ImportedHead, ImportError> {
 /// As [`read`].
 pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError> {
     let document = Document::load(bytes, path)?;
-    let imported = match document.gltf.extension_value(NAME) {
+    let mut imported = match document.gltf.extension_value(NAME) {
         Some(extension) => own::read(&document, extension)?,
-        None => ImportedHead { head: foreign::read(&document)?, rig: None },
+        None => ImportedHead { head: foreign::read(&document)?, ..ImportedHead::default() },
     };
     imported.head.validate()?;
+    imported.animation = motion::read(&document)?;
     Ok(imported)
 }

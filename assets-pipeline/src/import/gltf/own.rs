@@ -36,7 +36,7 @@ pub(super) fn read(document: &Document, extension: &serde_json::Value) -> Result
         let values = accessor::floats::<1>(document, &at, &accessor::by_index(document, &at, index)?)?;
         head.mesh.occlusion = values.into_iter().map(|[v]| v).collect();
     }
-    Ok(ImportedHead { head, rig: extension.rig })
+    Ok(ImportedHead { head, rig: extension.rig, sequence: extension.sequence, animation: None })
 }
 
 fn geometry(

@@ -36,9 +36,11 @@ fn neighbor_weights(weights: texture_2d<f32>, p: vec2<i32>, edges: vec4<bool>) -
 fn neighbor_shares(weights: vec4<f32>) -> vec4<f32> {
     var taken = weights;
     if !AVERAGE_LINES {
-        // The stronger direction alone.
-        let across = max(weights.z, weights.w) > max(weights.x, weights.y);
-        taken = select(vec4(weights.xy, 0.0, 0.0), vec4(0.0, 0.0, weights.zw), across);
+        // The stronger direction alone; both where they are equal, or the vertical one as published.
+        let across = max(weights.z, weights.w);
+        let along = max(weights.x, weights.y);
+        let vertical = along > across || (PUBLISHED && along == across);
+        taken = select(vec4(0.0), weights, vec4(vec2(vertical || along == across), vec2(!vertical)));
     }
     // Equation 9.1 for each line, averaged with the weights themselves.
     return taken * taken / (taken.x + taken.y + taken.z + taken.w);

@@ -30,9 +30,9 @@
 //!   kernel copies the image on its way, so that 1x reads and writes every pixel once.
 //! - Contrast is compared in whole 1/65535 steps of luma, so ties do not depend on rounding. Alpha is a channel of its
 //!   own in edge detection, and straight alpha weighs blended colours.
-//! - Diagonals that fall to the right stand for the left edges of their own steps, and the coverage of diagonals with an
-//!   open end does not depend on which end that is. The published shader gives those edges weights twice, so that
-//!   mirrored images differ; [`DiagonalEdges::Published`] does the same.
+//! - Diagonals are stairs that a straight line can have left, found in the same way at top and at left edges and
+//!   mirrored ([`Patterns::Revised`], which lists the other differences). The published shader finds them at top
+//!   edges, also where both ends turn the same way, as on circles; [`Patterns::Published`] does the same.
 //! - Colour edges compare neighbours at a distance of one pixel throughout; the published shader compares with the
 //!   pixel two to the left in one of its terms.
 //! - Outside of the image lines run on and nothing crosses them; the published shader repeats the edges of the
@@ -63,7 +63,7 @@ mod tables;
 
 pub use filter::Filter;
 pub use settings::{
-    Alpha, BlendSpace, DiagonalEdges, EdgeSource, Encoding, Mode, Predication, Preset, Settings, Subsample,
+    Alpha, BlendSpace, EdgeSource, Encoding, Mode, Patterns, Predication, Preset, Settings, Subsample,
 };
 pub use tables::Tables;
 
@@ -151,7 +151,7 @@ struct Params {
     depth_threshold: f32,
     corner_rounding: u32,
     history_valid: u32,
-    unused: u32,
+    falling_in_columns: u32,
 }
 
 /// How pixels are handed to the device in 1x and MLAA. The result is the same.
@@ -303,12 +303,13 @@ impl Antialias {
                 (EdgeSource::Depth, _) | (_, None) => settings.depth_threshold,
                 (_, Some(predication)) => predication.depth_threshold,
             };
+            let blocks = tables.positions(&settings.mode.subsamples(frame)[sample]).map(|b| b as u32);
             let params = Params {
                 size,
                 words,
                 thresholds: thresholds.map(|factor| reference::threshold_steps(factor * settings.threshold)),
                 search_limits: [back, ahead],
-                blocks: tables.positions(&settings.mode.subsamples(frame)[sample]).map(|b| b as u32),
+                blocks: [blocks[0], blocks[1], blocks[2], blocks[3]],
                 first_column: words[0] * height,
                 stride: tables.areas.stride,
                 diagonal_base: tables.areas.diagonal_base,
@@ -316,7 +317,7 @@ impl Antialias {
                 depth_threshold,
                 corner_rounding: settings.corner_rounding,
                 history_valid,
-                unused: 0,
+                falling_in_columns: blocks[4],
             };
             gpu.uniform("antialias params", &params)
         };
@@ -587,11 +588,11 @@ impl Kernel {
             ),
             Self::Weights => format!(
                 "const STOP_AT_CROSSINGS = {};\nconst DIAGONALS = {};\nconst ROUND_CORNERS = {};\n\
-                 const PUBLISHED_DIAGONALS = {};\nconst DIAGONAL_SLOT = {}u;\n",
+                 const RUN_ON = {};\nconst DIAGONAL_SLOT = {}u;\n",
                 mode != Mode::Mlaa,
                 settings.diagonal_steps > 0,
                 settings.corner_rounding < 100,
-                settings.diagonal_edges == DiagonalEdges::Published,
+                settings.patterns == Patterns::Revised,
                 lookups::DIAGONAL_SLOT,
             ),
             Self::Blend | Self::Resolve => format!(
@@ -603,7 +604,11 @@ impl Kernel {
                 mode.is_temporal(),
             ),
         };
-        let constants = format!("{constants}const STRAIGHT_ALPHA = {};\n", settings.alpha == Alpha::Straight);
+        let constants = format!(
+            "{constants}const STRAIGHT_ALPHA = {};\nconst PUBLISHED = {};\n",
+            settings.alpha == Alpha::Straight,
+            settings.patterns == Patterns::Published,
+        );
         let parts: &[&str] = match self {
             Self::Edges => &[include_str!("edges.wgsl")],
             Self::Weights if dispatch == Dispatch::Tiles => {

@@ -3,7 +3,7 @@
 //! The image is continued by its border pixels, so outside of it there are no new edges and lines run on.
 
 use super::lookups::{AreaTable, DIAGONAL_SLOT};
-use super::settings::{Alpha, BlendSpace, DiagonalEdges, EdgeSource, Encoding, Mode, Settings, Subsample};
+use super::settings::{Alpha, BlendSpace, EdgeSource, Encoding, Mode, Patterns, Settings, Subsample};
 use super::tables::Tables;
 use rayon::prelude::*;
 
@@ -180,27 +180,67 @@ impl Lines<'_> {
         u32::from(self.crossing(x, y - 1)) | u32::from(self.crossing(x, y)) << 1
     }
 
+    /// Whether something ends a line between (x - 1, y) and (x, y).
+    fn is_crossed(&self, x: isize, y: isize, stop: Stop) -> bool {
+        match (stop, self.crossing_code(x, y)) {
+            (Stop::Never, _) | (_, 0) => false,
+            // Where contours cross, this one runs on; but not where two pixels of a thin shape touch.
+            (Stop::AtTurns, 3) => !self.crossing(x, y - 2) && !self.crossing(x, y + 1),
+            _ => true,
+        }
+    }
+
     /// Pixels from x to the end of the line in direction `step`, at most `limit`.
-    fn distance(&self, x: isize, y: isize, step: isize, limit: u32, stop_at_crossings: bool) -> u32 {
+    fn distance(&self, x: isize, y: isize, step: isize, limit: u32, stop: Stop) -> u32 {
         let mut at = x;
         for distance in 0..limit {
             // The border between `at` and the next pixel belongs to the right one of the two.
             let border = if step < 0 { at } else { at + 1 };
-            let crossed = stop_at_crossings && self.crossing_code(border, y) != 0;
-            if crossed || !self.line(at + step, y) {
+            if self.is_crossed(border, y, stop) || !self.line(at + step, y) {
                 return distance;
             }
             at += step;
         }
         limit
     }
+
+    fn has(&self, x: isize, y: isize) -> bool {
+        let (width, height) = (self.edges.width as isize, self.edges.height as isize);
+        let (length, count) = if self.turned { (height, width) } else { (width, height) };
+        (0..length).contains(&x) && (0..count).contains(&y)
+    }
 }
 
-/// Longest distances searched: the published searches fetch pairs of pixels, so to the left (and up) the last
-/// step ends one pixel short.
+/// What ends a line of edges, beside its last edge.
+#[derive(Clone, Copy)]
+enum Stop {
+    /// Nothing: chapter 9.
+    Never,
+    /// Crossing edges on any side: as published.
+    AtCrossings,
+    /// Crossing edges, but not those of another contour that crosses this one.
+    AtTurns,
+}
+
+impl Stop {
+    fn of(settings: &Settings) -> Self {
+        match (settings.mode, settings.patterns) {
+            (Mode::Mlaa, _) => Self::Never,
+            (_, Patterns::Published) => Self::AtCrossings,
+            (_, Patterns::Revised) => Self::AtTurns,
+        }
+    }
+}
+
+/// Longest distances searched, backwards and forwards: the published searches fetch pairs of pixels, so to the left
+/// (and up) the last step ends one pixel short.
 pub(super) fn search_limits(settings: &Settings) -> (u32, u32) {
     let limit = 2 * settings.search_steps;
-    if settings.mode == Mode::Mlaa { (limit, limit) } else { (limit - 1, limit) }
+    if settings.mode == Mode::Mlaa || settings.patterns == Patterns::Revised {
+        (limit, limit)
+    } else {
+        (limit - 1, limit)
+    }
 }
 
 /// Distances from (x, y) to the ends of the line of edges through its upper border.
@@ -208,7 +248,7 @@ pub(super) fn search_limits(settings: &Settings) -> (u32, u32) {
 pub(super) fn row_distances(edges: &Edges, x: isize, y: isize, settings: &Settings) -> (u32, u32) {
     let lines = Lines { edges, turned: false };
     let (left, right) = search_limits(settings);
-    (lines.distance(x, y, -1, left, true), lines.distance(x, y, 1, right, true))
+    (lines.distance(x, y, -1, left, Stop::of(settings)), lines.distance(x, y, 1, right, Stop::of(settings)))
 }
 
 /// Weight of two packed 16-bit fractions.
@@ -225,10 +265,9 @@ fn line_weights(
     areas: &AreaTable,
     settings: &Settings,
 ) -> [f64; 2] {
-    let smaa = settings.mode != Mode::Mlaa;
     let (limit_left, limit_right) = search_limits(settings);
-    let left = lines.distance(x, y, -1, limit_left, smaa);
-    let right = lines.distance(x, y, 1, limit_right, smaa);
+    let left = lines.distance(x, y, -1, limit_left, Stop::of(settings));
+    let right = lines.distance(x, y, 1, limit_right, Stop::of(settings));
     let (first, after) = (x - left as isize, x + right as isize + 1);
     let pattern = lines.crossing_code(first, y) | lines.crossing_code(after, y) << 2;
     let entry = ((block as u32 * 16 + pattern) * areas.stride + left) * areas.stride + right;
@@ -246,6 +285,82 @@ fn line_weights(
         }
     }
     area
+}
+
+/// An edge of a stair, with its place relative to the edge that the search started at.
+#[derive(Clone, Copy)]
+struct Edge {
+    x: isize,
+    y: isize,
+    is_level: bool,
+}
+
+/// Weights of the stair through the upper border of (x, y) that rises to the right, or falls, if a straight line left
+/// it ([`Patterns::Revised`]).
+fn stair_weights(
+    lines: &Lines,
+    (x, y): (isize, isize),
+    rises: bool,
+    block: usize,
+    areas: &AreaTable,
+    steps: u32,
+) -> Option<[f64; 2]> {
+    let exists = |edge: Edge| {
+        let Edge { x, y, is_level } = edge;
+        lines.has(x, y) && if is_level { lines.line(x, y) } else { lines.crossing(x, y) }
+    };
+    let up = if rises { -1 } else { 1 };
+    // The vertices of the stair lie between pixels: vertex (x, y) is the upper left corner of pixel (x, y).
+    let level = |(x, y): (isize, isize), to: isize| Edge { x: x.min(x + to), y, is_level: true };
+    let upright = |(x, y): (isize, isize), to: isize| Edge { x, y: y.min(y + to * up), is_level: false };
+    // Edges beyond the first in direction `to`, and whether the last one goes straight on.
+    let follow = |to: isize| {
+        let mut vertex = if to > 0 { (x + 1, y) } else { (x, y) };
+        let mut is_level = true;
+        for count in 0..2 * steps {
+            let (turn, straight) = match is_level {
+                true => (upright(vertex, to), level(vertex, to)),
+                false => (level(vertex, to), upright(vertex, to)),
+            };
+            if !exists(turn) {
+                return (count, exists(straight));
+            }
+            vertex = if is_level { (vertex.0, vertex.1 + to * up) } else { (vertex.0 + to, vertex.1) };
+            is_level = !is_level;
+        }
+        (2 * steps, false)
+    };
+    let ((before, starts), (after, ends)) = (follow(-1), follow(1));
+    // Both ends level or both upright: the line drifts from one side of the stair to the other.
+    if !(starts && ends && before % 2 == after % 2 && before + after >= 4) {
+        return None;
+    }
+    let slot = 2 * steps + 1;
+    let entry = (block as u32 * slot + before) * slot + after;
+    let [below, above] = unpack(areas.areas[(areas.diagonal_base + entry) as usize]);
+    Some(if rises { [below, above] } else { [above, below] })
+}
+
+/// Weights of the edge through the upper border of (x, y): of the stairs that it belongs to, or of its line.
+/// `blocks` are those of lines, of rising and of falling stairs.
+fn revised_weights(
+    lines: &Lines,
+    x: isize,
+    y: isize,
+    blocks: [usize; 3],
+    areas: &AreaTable,
+    settings: &Settings,
+) -> [f64; 2] {
+    let steps = settings.diagonal_steps;
+    let stair = |rises, block| stair_weights(lines, (x, y), rises, block, areas, steps);
+    let [rising, falling] = match steps {
+        0 => [None; 2],
+        _ => [stair(true, blocks[1]), stair(false, blocks[2])],
+    };
+    match (rising, falling) {
+        (Some(a), Some(b)) => [a[0] + b[0], a[1] + b[1]],
+        (a, b) => a.or(b).unwrap_or_else(|| line_weights(lines, x, y, blocks[0], areas, settings)),
+    }
 }
 
 /// Weights of the two diagonals through the upper border of a pixel, zeros where there is none.
@@ -322,47 +437,50 @@ fn diagonal_weights(
 /// Lifts sums that are a half but for rounding, so that ties go up as in integers.
 const TIE: f64 = 1e-9;
 
-/// Blending weights of every pixel. `blocks` are places in `areas`, in the order of [`Subsample::blocks`].
+/// Blending weights of every pixel. `blocks` are places in `areas`, in the order of [`Tables::positions`].
 pub fn blending_weights(
     edges: &Edges,
-    blocks: [usize; 4],
+    blocks: [usize; 5],
     areas: &AreaTable,
     settings: &Settings,
 ) -> Vec<Weights> {
     let byte = |weight: f64| (weight.min(1.0) * 255.0 + 0.5 + TIE).floor() as u8;
     let (rows, columns) = (Lines { edges, turned: false }, Lines { edges, turned: true });
-    let weights_at = |i: usize| -> Weights {
+    let [left, top, rising, falling, falling_in_columns] = blocks;
+    let at_edges = |i: usize| -> [[f64; 2]; 2] {
         let (x, y) = ((i % edges.width) as isize, (i / edges.width) as isize);
-        let mut weights = [0; 4];
-        let diagonals = |x: isize, y: isize| {
-            if settings.diagonal_steps == 0 || !rows.line(x, y) {
-                return Diagonals::default();
+        let mut weights = [[0.0; 2]; 2];
+        if settings.patterns == Patterns::Revised {
+            if edges.top[i] {
+                weights[0] = revised_weights(&rows, x, y, [top, rising, falling], areas, settings);
             }
-            diagonal_weights(edges, x, y, [blocks[2], blocks[3]], areas, settings.diagonal_steps)
-        };
+            if edges.left[i] {
+                let blocks = [left, rising, falling_in_columns];
+                weights[1] = revised_weights(&columns, y, x, blocks, areas, settings);
+            }
+            return weights;
+        }
         let some = |area: [f64; 2]| area[0] + area[1] > 0.0;
-        let own = diagonals(x, y);
+        let mut own = Diagonals::default();
         if edges.top[i] {
-            let area = if some(own.rising) || some(own.falling) {
+            if settings.diagonal_steps > 0 {
+                own = diagonal_weights(edges, x, y, [rising, falling], areas, settings.diagonal_steps);
+            }
+            weights[0] = if some(own.rising) || some(own.falling) {
                 [own.rising[0] + own.falling[0], own.rising[1] + own.falling[1]]
             } else {
-                line_weights(&rows, x, y, blocks[1], areas, settings)
+                line_weights(&rows, x, y, top, areas, settings)
             };
-            weights[0] = byte(area[0]);
-            weights[1] = byte(area[1]);
         }
-        // A diagonal stands for both edges of its steps: a rising one for the left edge of the same pixel, a falling
-        // one for the left edge of the next pixel.
-        let treated = match settings.diagonal_edges {
-            DiagonalEdges::Both => some(own.rising) || (x > 0 && some(diagonals(x - 1, y).falling)),
-            DiagonalEdges::Published => some(own.rising) || some(own.falling),
-        };
-        if edges.left[i] && !treated {
-            let area = line_weights(&columns, y, x, blocks[0], areas, settings);
-            weights[2] = byte(area[0]);
-            weights[3] = byte(area[1]);
+        // Diagonals of a top edge stand for the left edge of the same pixel too.
+        if edges.left[i] && !some(own.rising) && !some(own.falling) {
+            weights[1] = line_weights(&columns, y, x, left, areas, settings);
         }
         weights
+    };
+    let weights_at = |i: usize| -> Weights {
+        let [top, left] = at_edges(i);
+        [byte(top[0]), byte(top[1]), byte(left[0]), byte(left[1])]
     };
     (0..edges.width * edges.height).into_par_iter().map(weights_at).collect()
 }
@@ -408,9 +526,11 @@ pub fn blend(picture: &Picture, weights: &[Weights], settings: &Settings) -> Pic
         let vertical = [(down, picture.at(x, y + 1)), (up, picture.at(x, y - 1))];
         let horizontal = [(right, picture.at(x + 1, y)), (left, picture.at(x - 1, y))];
         // MLAA averages over all lines through the pixel (section 9.5); SMAA takes the stronger direction.
-        let taken: Vec<(f32, [f32; 4])> = if settings.mode == Mode::Mlaa {
+        let (across, along) = (right.max(left), down.max(up));
+        let tie = across == along && settings.patterns == Patterns::Revised;
+        let taken: Vec<(f32, [f32; 4])> = if settings.mode == Mode::Mlaa || tie {
             vertical.into_iter().chain(horizontal).collect()
-        } else if right.max(left) > down.max(up) {
+        } else if across > along {
             horizontal.to_vec()
         } else {
             vertical.to_vec()

@@ -25,7 +25,8 @@ struct Params {
     corner_rounding: u32,
     // 1 where the previous frame may be used.
     history_valid: u32,
-    unused: u32,
+    // Block of coverage for falling diagonals seen from columns.
+    falling_in_columns: u32,
 }
 
 fn srgb_from_linear(linear: vec3<f32>) -> vec3<f32> {

@@ -1,7 +1,7 @@
 //! The coverage that a mode needs, and where its subsamples find theirs.
 
-use super::lookups::{AreaTable, area_texture, mlaa_area_texture};
-use super::settings::{DiagonalEdges, Mode, Settings, Subsample};
+use super::lookups::{AreaTable, OPPOSITE_DIAGONAL_OFFSET, area_texture, mlaa_area_texture};
+use super::settings::{Mode, Patterns, Settings, Subsample};
 
 /// Coverage for the subsample offsets of a mode.
 #[derive(Debug, Clone)]
@@ -25,23 +25,21 @@ impl Tables {
             blocks
         };
         let (orthogonal_blocks, diagonal_blocks) = (used([0, 1]), used([2, 3]));
+        let (_, longest) = super::reference::search_limits(settings);
         let areas = if settings.mode == Mode::Mlaa {
             AreaTable::mlaa(&mlaa_area_texture())
+        } else if settings.patterns == Patterns::Published {
+            AreaTable::smaa(&area_texture(), longest as usize, &orthogonal_blocks, &diagonal_blocks)
         } else {
-            let (_, longest) = super::reference::search_limits(settings);
-            AreaTable::smaa(
-                &area_texture(),
-                longest as usize,
-                &orthogonal_blocks,
-                &diagonal_blocks,
-                settings.diagonal_edges == DiagonalEdges::Both,
-            )
+            let steps = settings.diagonal_steps as usize;
+            AreaTable::exact(longest as usize, steps, &orthogonal_blocks, &diagonal_blocks)
         };
         Self { areas, orthogonal_blocks, diagonal_blocks }
     }
 
-    /// Places in `areas` of the blocks of a subsample of the same mode, in the same order.
-    pub fn positions(&self, subsample: &Subsample) -> [usize; 4] {
+    /// Places in `areas` of the blocks of a subsample of the same mode, in the same order; last that of diagonals
+    /// that fall to the right as seen from columns, where the sample lies on their other side.
+    pub fn positions(&self, subsample: &Subsample) -> [usize; 5] {
         let place = |blocks: &[usize], block| blocks.iter().position(|&b| b == block).unwrap_or(0);
         let [left, top, rising, falling] = subsample.blocks;
         [
@@ -49,6 +47,7 @@ impl Tables {
             place(&self.orthogonal_blocks, top),
             place(&self.diagonal_blocks, rising),
             place(&self.diagonal_blocks, falling),
+            place(&self.diagonal_blocks, OPPOSITE_DIAGONAL_OFFSET[falling]),
         ]
     }
 }

@@ -61,7 +61,13 @@ fn search_back(lines: Lines, line: i32, at: i32, limit: u32) -> u32 {
         let start = at - i32(done);
         var stops = ~behind(lines, line, start - 1).x;
         if STOP_AT_CROSSINGS {
-            stops |= behind(lines, line, start).y | behind(lines, line - 1, start).y;
+            let below = behind(lines, line, start).y;
+            let above = behind(lines, line - 1, start).y;
+            stops |= below | above;
+            if RUN_ON && (below & above) != 0u {
+                let arms = behind(lines, min(line + 1, lines.count - 1), start).y | behind(lines, max(line - 2, 0), start).y;
+                stops = (stops & ~(below & above & arms)) | ~behind(lines, line, start - 1).x;
+            }
         }
         if stops != 0u {
             return min(done + countLeadingZeros(stops), limit);
@@ -76,7 +82,13 @@ fn search_ahead(lines: Lines, line: i32, at: i32, limit: u32) -> u32 {
         let next = ahead(lines, line, at + i32(done) + 1);
         var stops = ~next.x;
         if STOP_AT_CROSSINGS {
-            stops |= next.y | ahead(lines, line - 1, at + i32(done) + 1).y;
+            let above = ahead(lines, line - 1, at + i32(done) + 1).y;
+            stops |= next.y | above;
+            if RUN_ON && (next.y & above) != 0u {
+                let start = at + i32(done) + 1;
+                let arms = ahead(lines, min(line + 1, lines.count - 1), start).y | ahead(lines, max(line - 2, 0), start).y;
+                stops = (stops & ~(next.y & above & arms)) | ~next.x;
+            }
         }
         if stops != 0u {
             return min(done + countTrailingZeros(stops), limit);
@@ -192,6 +204,71 @@ fn falling_weights(p: vec2<i32>) -> vec2<u32> {
     return diagonal_area(params.blocks.w, near_code, far_code, vec2(near.distance, far.distance)).yx;
 }
 
+// An edge along the line above a pixel, and one across it to its left.
+fn edges_of(lines: Lines, line: i32, at: i32) -> vec2<u32> {
+    if line < 0 || line >= lines.count || at < 0 || at >= lines.length {
+        return vec2(0u);
+    }
+    return (bits[lines.first + u32(line) * lines.words + u32(at >> 5u)] >> vec2(u32(at & 31))) & vec2(1u);
+}
+
+// Weights of a stair that a straight line left, or zeros. Treads and risers take turns: riser k comes before tread k,
+// which is k pixels further along; tread 0 is the edge in question.
+fn stair_weights(lines: Lines, line: i32, at: i32, rises: bool, block: u32) -> vec2<u32> {
+    let up = select(1, -1, rises);
+    let riser_line = line - select(1, 0, rises);
+    let limit = 2u * params.diagonal_steps;
+    // Forwards. Reading a riser's pixel gives the tread of a rising stair too, but not that of a falling one.
+    var after = 0u;
+    var straight = 0u;
+    for (var k = 1; after < limit; k++) {
+        if edges_of(lines, riser_line + up * k, at + k).y == 0u {
+            straight = edges_of(lines, line + up * (k - 1), at + k).x;
+            break;
+        }
+        after++;
+        if edges_of(lines, line + up * k, at + k).x == 0u {
+            straight = edges_of(lines, riser_line + up * (k + 1), at + k).y;
+            break;
+        }
+        after++;
+    }
+    if straight == 0u {
+        return vec2(0u);
+    }
+    var before = 0u;
+    straight = 0u;
+    for (var k = 0; before < limit; k--) {
+        if edges_of(lines, riser_line + up * k, at + k).y == 0u {
+            straight = edges_of(lines, line + up * k, at + k - 1).x;
+            break;
+        }
+        before++;
+        if edges_of(lines, line + up * (k - 1), at + k - 1).x == 0u {
+            straight = edges_of(lines, riser_line + up * (k - 1), at + k).y;
+            break;
+        }
+        before++;
+    }
+    if straight == 0u || ((before ^ after) & 1u) == 1u || before + after < 4u {
+        return vec2(0u);
+    }
+    let packed = areas[params.diagonal_base + (block * (limit + 1u) + before) * (limit + 1u) + after];
+    let area = vec2(packed & 0xffffu, packed >> 16u);
+    return select(area.yx, area, rises);
+}
+
+fn revised_weights(lines: Lines, line: i32, at: i32, line_block: u32, falling_block: u32) -> vec2<u32> {
+    if DIAGONALS {
+        let found = stair_weights(lines, line, at, true, params.blocks.z)
+            + stair_weights(lines, line, at, false, falling_block);
+        if any(found != vec2(0u)) {
+            return found;
+        }
+    }
+    return line_weights(lines, line, at, line_block);
+}
+
 fn stored_weight(weight: vec2<u32>) -> vec2<f32> {
     // Whole steps of 1/255, so that storing rounds nothing.
     return vec2<f32>((min(weight, vec2(65535u)) + 128u) / 257u) / 255.0;
@@ -201,25 +278,27 @@ fn weigh(p: vec2<i32>) {
     let own = pixel_bits(p);
     var vertical = vec2(0u);
     var horizontal = vec2(0u);
-    // Whether a diagonal stands for the left edge too.
-    var treated = false;
-    if own.x == 1u {
-        if DIAGONALS {
-            let rising = rising_weights(p, own.y);
-            let falling = falling_weights(p);
-            vertical = rising + falling;
-            treated = any(rising != vec2(0u)) || (PUBLISHED_DIAGONALS && any(falling != vec2(0u)));
+    if PUBLISHED {
+        // Whether a diagonal stands for the left edge too.
+        var treated = false;
+        if own.x == 1u {
+            if DIAGONALS {
+                vertical = rising_weights(p, own.y) + falling_weights(p);
+                treated = any(vertical != vec2(0u));
+            }
+            if !treated {
+                vertical = line_weights(rows(), p.y, p.x, params.blocks.y);
+            }
         }
-        if all(vertical == vec2(0u)) {
-            vertical = line_weights(rows(), p.y, p.x, params.blocks.y);
-        }
-    }
-    if own.y == 1u && !treated {
-        if DIAGONALS && !PUBLISHED_DIAGONALS && pixel_bits(p - vec2(1, 0)).x == 1u {
-            treated = any(falling_weights(p - vec2(1, 0)) != vec2(0u));
-        }
-        if !treated {
+        if own.y == 1u && !treated {
             horizontal = line_weights(columns(), p.x, p.y, params.blocks.x);
+        }
+    } else {
+        if own.x == 1u {
+            vertical = revised_weights(rows(), p.y, p.x, params.blocks.y, params.blocks.w);
+        }
+        if own.y == 1u {
+            horizontal = revised_weights(columns(), p.x, p.y, params.blocks.x, params.falling_in_columns);
         }
     }
     textureStore(weights_out, p, vec4(stored_weight(vertical), stored_weight(horizontal)));

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! bias_i - mu_n, scale_i - 1, weights --+--appearance--> blood    (change of bias, change of scale, mu_n)
-//! zone masks, weights ------------------+              > wrinkles (weight of each wrinkle map, 0 to 1)
+//! zone masks, weights ------------------+              > wrinkles (weight of each wrinkle map, 0 to 1; four a layer)
 //! ```
 //!
 //! Theory: papers/004 eq. 7.6 and section 8.2. Eq. 7.6 is written as changes of the neutral,
@@ -13,6 +13,10 @@
 //! a pixel, so a pixel pays two fetches however many distributions and zones there are.
 //!
 //! Does not: clamp hemoglobin to its physical range (that needs `H_n`: see `shade`).
+
+mod method;
+
+pub use method::{AppearanceMethods, ColorMethod, WrinkleMethod};
 
 use crate::gpu::Gpu;
 use crate::head::{APPEARANCE_SIZE, MAX_DISTRIBUTIONS, MAX_ZONES, MapsOnGpu};
@@ -26,7 +30,8 @@ pub(crate) const SHADER: &str = include_str!("appearance.wgsl");
 pub(crate) struct Params {
     pub(crate) distribution_count: u32,
     pub(crate) zone_count: u32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) wrinkle_layers: u32,
+    pub(crate) padding: u32,
     pub(crate) distribution_weights: [f32; MAX_DISTRIBUTIONS],
     pub(crate) zone_weights: [f32; MAX_ZONES],
     pub(crate) zone_maps: [u32; MAX_ZONES],
@@ -39,16 +44,40 @@ pub(crate) struct Blended {
 }
 
 impl Blended {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+    /// For a head with `wrinkle_maps` of them.
+    pub(crate) fn new(gpu: &Gpu, wrinkle_maps: u32) -> Self {
         let usage = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
-        let map = |label, format| {
-            gpu.target(label, [APPEARANCE_SIZE; 2], format, usage).create_view(&Default::default())
-        };
+        let wrinkles = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("wrinkle weights"),
+            size: wgpu::Extent3d {
+                width: APPEARANCE_SIZE,
+                height: APPEARANCE_SIZE,
+                depth_or_array_layers: layers_of(wrinkle_maps),
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8Unorm,
+            usage,
+            view_formats: &[],
+        });
         Self {
-            blood: map("blood", wgpu::TextureFormat::Rgba16Float),
-            wrinkles: map("wrinkle weights", wgpu::TextureFormat::Rgba8Unorm),
+            blood: gpu
+                .target("blood", [APPEARANCE_SIZE; 2], wgpu::TextureFormat::Rgba16Float, usage)
+                .create_view(&Default::default()),
+            wrinkles: crate::texture::array_view_of(&wrinkles),
         }
     }
+
+    /// Whether a head with `wrinkle_maps` of them can use it.
+    pub(crate) fn fits(&self, wrinkle_maps: u32) -> bool {
+        self.wrinkles.texture().depth_or_array_layers() == layers_of(wrinkle_maps)
+    }
+}
+
+/// Four wrinkle maps have their weights in one layer.
+fn layers_of(wrinkle_maps: u32) -> u32 {
+    wrinkle_maps.div_ceil(4).max(1)
 }
 
 /// The pipeline of the pass.
@@ -91,7 +120,8 @@ impl Appearance {
         let params = Params {
             distribution_count: maps.distribution_count.min(distributions.len() as u32),
             zone_count: (maps.zone_maps.len() as u32).min(zones.len() as u32),
-            padding: [0; 2],
+            wrinkle_layers: layers_of(maps.wrinkle_maps),
+            padding: 0,
             distribution_weights: filled(distributions),
             zone_weights: filled(zones),
             zone_maps,
@@ -117,3 +147,6 @@ impl Appearance {
         pass.dispatch_workgroups(APPEARANCE_SIZE / 8, APPEARANCE_SIZE / 8, 1);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -26,7 +26,7 @@ struct Root {
 @group(0) @binding(4) var<storage, read> triangles: array<vec4u>;
 @group(0) @binding(5) var<storage, read> frames: array<SurfaceFrame>;
 @group(0) @binding(6) var<storage, read> roots: array<Root>;
-// Diffuse radiance of a white surface; a = 0 where there is no skin.
+// Diffuse radiance of a white surface; a = relative depth, FAR_MM where there is no skin.
 @group(0) @binding(7) var irradiance: texture_2d<f32>;
 
 // Metres.
@@ -92,7 +92,7 @@ fn cropped_hair_vertex(@builtin(vertex_index) index: u32) -> Corner {
     let pixel = (root_clip.xy / root_clip.w * vec2f(0.5, -0.5) + 0.5) * size;
     let at = vec2i(clamp(pixel, vec2f(0.0), size - 1.0));
     let seen = textureLoad(irradiance, at, 0);
-    let light = select(0.8 * params.ambient.rgb, seen.rgb, seen.a > 0.0);
+    let light = select(0.8 * params.ambient.rgb, seen.rgb, seen.a < FAR_MM);
     let tone = mix(0.55, 1.5, look.y) * select(0.75, 1.35, corner == 2u);
     return Corner(clip, params.color.rgb * light * tone, true_pixels / drawn);
 }

@@ -1,17 +1,20 @@
 // What all scattering methods share. Concatenated after view.wgsl.
 
 const MM_PER_METRE = 1000.0;
-// Depth of what does not scatter: no kernel reaches it.
-const NO_SKIN_MM = 1e8;
+// Depth of the background.
+const NOTHING_MM = 1e8;
+// Relative depths from here on are not of skin: FAR_MM, or a mixture with it. Skin that much behind the nearest head does
+// not scatter, nor could that be seen.
+const NO_SKIN_MM = 4000.0;
 // Depth change for a millimetre across beyond which two neighbours are taken for two surfaces (76 degrees).
 const MAX_SLOPE = 4.0;
 // Radius of a kernel in pixels above which positions would leave the range of integers.
 const MAX_REACH = 1e6;
 const HALF_MAX = 65504.0;
 
-// View depth in millimetres of a skin pixel.
-fn skin_depth_mm(view: View, depth: f32, strength: f32) -> f32 {
-    return select(NO_SKIN_MM, MM_PER_METRE * view_depth(view, depth), strength > 0.0 && depth > 0.0);
+// View depth in millimetres.
+fn depth_mm(view: View, depth: f32) -> f32 {
+    return select(NOTHING_MM, MM_PER_METRE * view_depth(view, depth), depth > 0.0);
 }
 
 // Pixels for a millimetre of a surface that faces the camera.

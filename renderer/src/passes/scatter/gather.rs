@@ -30,8 +30,12 @@ pub(crate) struct Gather {
 
 /// WGSL of the pass of a method.
 pub(crate) fn shader(method: &str) -> String {
-    [include_str!("../../shared/view.wgsl"), include_str!("common.wgsl"), include_str!("gather.wgsl"), method]
-        .concat()
+    let shared = concat!(
+        include_str!("../../shared/view.wgsl"),
+        include_str!("common.wgsl"),
+        include_str!("gather.wgsl")
+    );
+    [shared, method].concat()
 }
 
 impl Gather {
@@ -64,6 +68,7 @@ impl Gather {
             self.params.as_entire_binding(),
             self.taps.as_entire_binding(),
             texture(images.irradiance),
+            texture(images.albedo),
             texture(images.depth),
             texture(images.scattered),
         ];

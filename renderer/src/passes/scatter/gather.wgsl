@@ -21,12 +21,16 @@ struct Tap {
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> params: Params;
 @group(0) @binding(2) var<storage, read> taps: array<Tap>;
+// rgb, a = depth in mm from view.depth_origin_mm on.
 @group(0) @binding(3) var irradiance: texture_2d<f32>;
-@group(0) @binding(4) var depth: texture_depth_2d;
-@group(0) @binding(5) var scattered: texture_storage_2d<rgba16float, write>;
+// a = strength of scattering.
+@group(0) @binding(4) var albedo: texture_2d<f32>;
+@group(0) @binding(5) var depth: texture_depth_2d;
+@group(0) @binding(6) var scattered: texture_storage_2d<rgba16float, write>;
 
 struct Center {
     color: vec3f,
+    // From view.depth_origin_mm on.
     depth_mm: f32,
     // Depth change to the next pixel, mm.
     slope: vec2f,
@@ -40,9 +44,12 @@ struct Texel {
 }
 
 fn texel(at: vec2i) -> Texel {
-    let p = clamp(at, vec2i(0), vec2i(view.size) - 1);
-    let c = textureLoad(irradiance, p, 0);
-    return Texel(min(c.rgb, vec3f(HALF_MAX)), skin_depth_mm(view, textureLoad(depth, p, 0), c.a));
+    let c = textureLoad(irradiance, clamp(at, vec2i(0), vec2i(view.size) - 1), 0);
+    return Texel(min(c.rgb, vec3f(HALF_MAX)), c.a);
+}
+
+fn depth_at(at: vec2i) -> f32 {
+    return depth_mm(view, textureLoad(depth, clamp(at, vec2i(0), vec2i(view.size) - 1), 0));
 }
 
 @compute @workgroup_size(8, 8)
@@ -52,24 +59,24 @@ fn scatter(@builtin(global_invocation_id) id: vec3u) {
     }
     let at = vec2i(id.xy);
     let raw = textureLoad(irradiance, at, 0);
-    let strength = raw.a;
-    let here = texel(at);
-    let per_mm = pixels_per_mm(view, here.depth_mm);
+    if raw.a >= NO_SKIN_MM {
+        textureStore(scattered, at, raw);
+        return;
+    }
+    let strength = textureLoad(albedo, at, 0).a;
+    let here = depth_at(at);
+    let per_mm = pixels_per_mm(view, here);
     if strength <= 0.0 || strength * per_mm * params.visible_mm < 0.5 {
         textureStore(scattered, at, raw);
         return;
     }
-    let left = texel(at - vec2i(1, 0)).depth_mm;
-    let right = texel(at + vec2i(1, 0)).depth_mm;
-    let above = texel(at - vec2i(0, 1)).depth_mm;
-    let below = texel(at + vec2i(0, 1)).depth_mm;
     let slope = vec2f(
-        surface_slope(left, here.depth_mm, right, per_mm),
-        surface_slope(above, here.depth_mm, below, per_mm),
+        surface_slope(depth_at(at - vec2i(1, 0)), here, depth_at(at + vec2i(1, 0)), per_mm),
+        surface_slope(depth_at(at - vec2i(0, 1)), here, depth_at(at + vec2i(0, 1)), per_mm),
     );
     let stretch = vec2f(foreshortening(slope.x, per_mm), foreshortening(slope.y, per_mm));
-    let center = Center(here.color, here.depth_mm, slope, strength * per_mm * stretch);
-    textureStore(scattered, at, vec4f(blur(at, center), strength));
+    let center = Center(min(raw.rgb, vec3f(HALF_MAX)), raw.a, slope, strength * per_mm * stretch);
+    textureStore(scattered, at, vec4f(blur(at, center), raw.a));
 }
 
 // Distance of a texel from the tangent plane of the centre, mm.

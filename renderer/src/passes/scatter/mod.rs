@@ -1,7 +1,7 @@
 //! Subsurface scattering in screen space: diffuse radiance of a white surface, blurred by the diffusion profile.
 //!
 //! ```text
-//! irradiance (a = strength), depth --the method of the frame--> scattered (rgba16f, linear Rec. 709)
+//! irradiance (a = depth), strength, depth --the method of the frame--> scattered (rgba16f, linear Rec. 709)
 //! ```
 //!
 //! Each method is a file or folder of its own: `separable`, `gauss`, `jitter`, `disk`, and the references `exact` and
@@ -52,7 +52,10 @@ pub(crate) struct Recorder<'a> {
 
 /// Images of the frame that methods read and write.
 pub(crate) struct Images<'a> {
+    /// rgb, a = depth in mm relative to `View::depth_origin_mm`: a texel is all that a tap needs, and interpolates.
     pub(crate) irradiance: &'a wgpu::TextureView,
+    /// a = strength.
+    pub(crate) albedo: &'a wgpu::TextureView,
     pub(crate) depth: &'a wgpu::TextureView,
     pub(crate) scratch: &'a wgpu::TextureView,
     pub(crate) scattered: &'a wgpu::TextureView,

@@ -1,6 +1,17 @@
 //! The methods on the CPU, in f64 and from their equations; the truth of the parity tests.
 
+use half::f16;
+
 use super::gather::Tap;
+
+/// Where relative depths begin, mm.
+pub(crate) const DEPTH_ORIGIN_MM: f64 = 400.0;
+/// A sample this near to the tangent plane is of one surface.
+const PLANE_MM: f64 = 0.1;
+/// So is one that is as near as a surface with a radius of 25 mm.
+const CURVATURE_PER_MM: f64 = 0.02;
+/// Relative depth of what is not skin.
+const FAR_MM: f64 = 8192.0;
 
 /// Share of a neighbour lost for a millimetre off the tangent plane.
 const FOLLOW_PER_MM: f64 = super::FOLLOW_PER_MM as f64;
@@ -20,7 +31,7 @@ pub(crate) struct Frame {
 /// The tangent plane of a pixel and the scale of its kernel.
 struct Center {
     color: [f64; 3],
-    depth_mm: f64,
+    relative_mm: f64,
     slope: [f64; 2],
     scale: [f64; 2],
 }
@@ -32,12 +43,19 @@ impl Frame {
         y * self.width + x
     }
 
+    /// Depth as the image of light keeps it.
+    pub(crate) fn relative_mm(&self, i: usize) -> f64 {
+        f16::from_f64((self.depth_mm[i] - DEPTH_ORIGIN_MM).clamp(-FAR_MM, FAR_MM)).to_f64()
+    }
+
     fn per_mm(&self, i: usize) -> f64 {
         self.focal_px / self.depth_mm[i]
     }
 
     fn is_sharp(&self, i: usize, visible_mm: f64) -> bool {
-        self.strength[i] <= 0.0 || self.strength[i] * self.per_mm(i) * visible_mm < 0.5
+        self.strength[i] <= 0.0
+            || self.relative_mm(i) >= 4000.0
+            || self.strength[i] * self.per_mm(i) * visible_mm < 0.5
     }
 
     /// Depth change to the next pixel along an axis: the smaller of both sides, 0 where the surface breaks.
@@ -55,14 +73,13 @@ impl Frame {
         let slope = [self.slope(x, y, 0), self.slope(x, y, 1)];
         let per_mm = self.per_mm(i);
         let scale = slope.map(|s| self.strength[i] * per_mm / (1.0 + (s * per_mm).powi(2)).sqrt());
-        Center { color: self.color[i], depth_mm: self.depth_mm[i], slope, scale }
+        Center { color: self.color[i], relative_mm: self.relative_mm(i), slope, scale }
     }
 
-    /// Share of the light of a pixel that reaches the centre from an offset in pixels.
-    fn arrives(&self, center: &Center, i: usize, offset: [f64; 2]) -> f64 {
-        let plane = center.depth_mm + center.slope[0] * offset[0] + center.slope[1] * offset[1];
-        let gap = (self.depth_mm[i] - plane).abs();
-        if gap.is_finite() { (1.0 - FOLLOW_PER_MM * gap).clamp(0.0, 1.0) } else { 0.0 }
+    /// Share of light at a relative depth that reaches the centre from an offset in pixels.
+    fn arrives(center: &Center, relative_mm: f64, offset: [f64; 2]) -> f64 {
+        let plane = center.relative_mm + center.slope[0] * offset[0] + center.slope[1] * offset[1];
+        (1.0 - FOLLOW_PER_MM * (relative_mm - plane).abs()).clamp(0.0, 1.0)
     }
 
     fn map(&self, f: impl Fn(i64, i64) -> [f64; 3]) -> Self {
@@ -72,8 +89,9 @@ impl Frame {
         Self { color, ..self.clone() }
     }
 
-    /// One direction of a kernel: taps on one side and their mirror images, linear between pixels.
-    pub(crate) fn line(&self, side: &[([f64; 3], f64)], visible_mm: f64, axis: usize) -> Self {
+    /// One direction of a kernel: taps on one side and their mirror images; light and depth are linear between pixels.
+    /// Taps are `shift_px` farther out than they should be.
+    pub(crate) fn line(&self, side: &[([f64; 3], f64)], visible_mm: f64, axis: usize, shift_px: f64) -> Self {
         self.map(|x, y| {
             let i = self.index(x, y);
             if self.is_sharp(i, visible_mm) {
@@ -83,16 +101,30 @@ impl Frame {
             let mut result = center.color;
             for (weight, offset_mm) in side {
                 for sign in [-1.0, 1.0] {
-                    let along = sign * offset_mm * center.scale[axis];
+                    let along = sign * (offset_mm * center.scale[axis] + shift_px);
                     let low = along.floor();
-                    for (pixel, share) in [(low, 1.0 - (along - low)), (low + 1.0, along - low)] {
+                    let [a, b] = [low, low + 1.0].map(|pixel| {
                         let step = pixel as i64;
-                        let j = if axis == 0 { self.index(x + step, y) } else { self.index(x, y + step) };
-                        let offset = if axis == 0 { [pixel, 0.0] } else { [0.0, pixel] };
-                        let k = share * self.arrives(&center, j, offset);
-                        for (c, r) in result.iter_mut().enumerate() {
-                            *r += weight[c] * k * (self.color[j][c] - center.color[c]);
-                        }
+                        if axis == 0 { self.index(x + step, y) } else { self.index(x, y + step) }
+                    });
+                    let between = |p: f64, q: f64| p + (along - low) * (q - p);
+                    let depth = between(self.relative_mm(a), self.relative_mm(b));
+                    let plane = center.relative_mm + center.slope[axis] * along;
+                    let is_on_plane =
+                        (depth - plane).abs() <= PLANE_MM.max(CURVATURE_PER_MM * offset_mm * offset_mm);
+                    let place = |pixel: f64| if axis == 0 { [pixel, 0.0] } else { [0.0, pixel] };
+                    let texel = |i: usize, pixel: f64, c: usize| {
+                        Self::arrives(&center, self.relative_mm(i), place(pixel))
+                            * (self.color[i][c] - center.color[c])
+                    };
+                    for (c, r) in result.iter_mut().enumerate() {
+                        *r += weight[c]
+                            * if is_on_plane {
+                                let light = between(self.color[a][c], self.color[b][c]);
+                                Self::arrives(&center, depth, place(along)) * (light - center.color[c])
+                            } else {
+                                between(texel(a, low, c), texel(b, low + 1.0, c))
+                            };
                     }
                 }
             }
@@ -123,7 +155,7 @@ impl Frame {
                     let there = [offset[0].floor() + cx, offset[1].floor() + cy];
                     let share = (1.0 - (offset[0] - there[0]).abs()) * (1.0 - (offset[1] - there[1]).abs());
                     let j = self.index(x + there[0] as i64, y + there[1] as i64);
-                    let k = share * self.arrives(&center, j, there);
+                    let k = share * Self::arrives(&center, self.relative_mm(j), there);
                     for (c, r) in result.iter_mut().enumerate() {
                         *r += f64::from(tap.weight[c]) * k * (self.color[j][c] - center.color[c]);
                     }
@@ -149,7 +181,7 @@ impl Frame {
                     let edge = |a: usize, half: f64| (offset[a] + half) / center.scale[a];
                     let weight = light(edge(0, -0.5), edge(1, -0.5), edge(0, 0.5), edge(1, 0.5));
                     let j = self.index(x + dx, y + dy);
-                    let k = self.arrives(&center, j, offset);
+                    let k = Self::arrives(&center, self.relative_mm(j), offset);
                     for (c, r) in result.iter_mut().enumerate() {
                         *r += weight[c] * k * (self.color[j][c] - center.color[c]);
                     }

@@ -40,7 +40,7 @@ impl Separable {
     pub(crate) fn record(&self, r: &mut Recorder<'_>, images: &Images<'_>) {
         let steps = [[images.irradiance, images.scratch], [images.scratch, images.scattered]];
         for (line, step) in self.lines.iter().zip(steps) {
-            line.record(r.gpu, r.encoder, r.timer, r.view, &self.params, images.depth, step, None);
+            line.record(r.gpu, r.encoder, r.timer, r.view, &self.params, images, step, None);
         }
     }
 }

@@ -5,7 +5,7 @@ use half::f16;
 use rubor_rig::skin::kernel::SeparableKernel;
 use rubor_rig::skin::profile::{Profile, RadialProfile};
 
-use super::reference::Frame;
+use super::reference::{DEPTH_ORIGIN_MM, Frame};
 use super::*;
 use crate::frame::View;
 use crate::testing::gpu;
@@ -69,6 +69,7 @@ impl Frame {
         view.origin = [0.0, 0.0, 0.0, self.focal_px as f32];
         view.size = [self.width as u32, self.height as u32];
         view.near = NEAR;
+        view.depth_origin_mm = DEPTH_ORIGIN_MM as f32;
         view
     }
 }
@@ -144,11 +145,13 @@ fn draw_depth(gpu: &Gpu, frame: &Frame) -> wgpu::TextureView {
     view
 }
 
-fn upload(gpu: &Gpu, frame: &Frame) -> wgpu::TextureView {
-    let texels = frame.color.iter().zip(&frame.strength);
-    let texels = texels.map(|(c, a)| [c[0] as f32, c[1] as f32, c[2] as f32, *a as f32]).collect();
+/// Irradiance, and albedo with strengths.
+fn upload(gpu: &Gpu, frame: &Frame) -> [wgpu::TextureView; 2] {
     let size = [frame.width as u32, frame.height as u32];
-    crate::texture::upload_half(gpu, "test irradiance", size, &[vec![texels]])
+    let image = |texels| crate::texture::upload_half(gpu, "test light", size, &[vec![texels]]);
+    let lit = frame.color.iter().enumerate().map(|(i, c)| [c[0], c[1], c[2], frame.relative_mm(i)]);
+    let irradiance = lit.map(|t| t.map(|v| v as f32)).collect();
+    [image(irradiance), image(frame.strength.iter().map(|a| [0.0, 0.0, 0.0, *a as f32]).collect())]
 }
 
 /// RGBA of each pixel.
@@ -160,17 +163,18 @@ fn read(gpu: &Gpu, image: &wgpu::TextureView) -> Vec<[f64; 4]> {
 
 fn run_with(gpu: &Gpu, frame: &Frame, mut work: impl FnMut(Recorder<'_>, &Images<'_>)) -> Vec<[f64; 4]> {
     let size = [frame.width as u32, frame.height as u32];
-    let irradiance = upload(gpu, frame);
+    let [irradiance, albedo] = upload(gpu, frame);
     let depth = draw_depth(gpu, frame);
     let (scratch, scattered) = (half_image(gpu, "scratch", size), half_image(gpu, "scattered", size));
-    let images = Images { irradiance: &irradiance, depth: &depth, scratch: &scratch, scattered: &scattered };
+    let (scratch, scattered) = (&scratch, &scattered);
+    let images = Images { irradiance: &irradiance, albedo: &albedo, depth: &depth, scratch, scattered };
     let view = gpu.uniform("view", &frame.view());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let mut timer = PassTimer::new(gpu);
     work(Recorder { gpu, encoder: &mut encoder, timer: &mut timer, view: &view }, &images);
     gpu.queue.submit([encoder.finish()]);
     gpu.check().unwrap();
-    read(gpu, &scattered)
+    read(gpu, scattered)
 }
 
 fn run(gpu: &Gpu, method: ScatterMethod, profile: &Arc<Profile>, frame: &Frame) -> Vec<[f64; 4]> {
@@ -206,15 +210,27 @@ fn hostile(seed: u64) -> Frame {
 /// Pixels agree within a relative bound for halves, which keep 11 bits, and one for depths: f32 knows 400 mm to 3e-5 mm,
 /// and a tangent plane ten pixels away multiplies that.
 fn assert_close(name: &str, found: &[[f64; 4]], expected: &Frame, relative: f64) {
-    let largest = expected.color.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
-    for (i, (f, e)) in found.iter().zip(&expected.color).enumerate() {
+    assert_between(name, found, [expected; 3], relative);
+}
+
+/// As [`assert_close`], and the truth may lie anywhere between three frames.
+fn assert_between(name: &str, found: &[[f64; 4]], expected: [&Frame; 3], relative: f64) {
+    let largest = expected[0].color.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
+    for (i, f) in found.iter().enumerate() {
         for c in 0..3 {
-            let bound = relative * e[c].abs() + 2e-5 * largest;
-            let at = (i % expected.width, i / expected.width);
-            assert!((f[c] - e[c]).abs() <= bound, "{name} at {at:?} channel {c}: {} and not {}", f[c], e[c]);
+            let e = expected.map(|frame| frame.color[i][c]);
+            let low = e.into_iter().fold(f64::INFINITY, f64::min);
+            let high = e.into_iter().fold(0.0, f64::max);
+            let bound = relative * high + 2e-5 * largest;
+            let at = (i % expected[0].width, i / expected[0].width);
+            let is_close = f[c] >= low - bound && f[c] <= high + bound;
+            assert!(is_close, "{name} at {at:?} channel {c}: {} and not {low} to {high}", f[c]);
         }
     }
 }
+
+/// Texture units place a sample to 1/256 of a pixel: where taps may be off their place, in pixels.
+const TAP_SHIFTS: [f64; 3] = [0.0, -1.0 / 256.0, 1.0 / 256.0];
 
 #[test]
 fn separable_agrees_with_its_equations() {
@@ -224,37 +240,11 @@ fn separable_agrees_with_its_equations() {
         let kernel = SeparableKernel::of(&skin(), samples).unwrap();
         let side = separable::side(&kernel);
         let width = kernel.half_width_mm();
-        let expected = frame.line(&side, width, 0).line(&side, width, 1);
+        let expected =
+            TAP_SHIFTS.map(|shift| frame.line(&side, width, 0, shift).line(&side, width, 1, shift));
         let found = run(gpu, ScatterMethod::Separable(samples as u32), &skin(), &frame);
         // Two roundings to half: one between the passes.
-        assert_close("separable", &found, &expected, 3e-3);
-    }
-}
-
-#[test]
-fn tiles_give_what_the_images_give() {
-    let Some(gpu) = gpu() else { return };
-    let kernel = SeparableKernel::of(&skin(), 17).unwrap();
-    let params =
-        gpu.uniform("test", &line::Params::new(&separable::side(&kernel), kernel.half_width_mm(), [0.0; 3]));
-    // The kernel fits into the tile at the first focal length and not at the second.
-    for focal in [900.0, 9000.0] {
-        let frame = Frame { focal_px: focal, ..hostile(4) };
-        for vertical in [false, true] {
-            let [tiled, untiled] = [true, false].map(|tiled| {
-                let line = line::Line::with_tiles(gpu, vertical, false, tiled);
-                run_with(gpu, &frame, |r, i| {
-                    let step = [i.irradiance, i.scattered];
-                    line.record(r.gpu, r.encoder, r.timer, r.view, &params, i.depth, step, None);
-                })
-            });
-            for (a, b) in tiled.iter().zip(&untiled) {
-                for c in 0..4 {
-                    // The order of operations may differ by the compiler's choice: a step of half.
-                    assert!((a[c] - b[c]).abs() <= 1e-3 * a[c].abs(), "{focal} {vertical}: {a:?} {b:?}");
-                }
-            }
-        }
+        assert_between("separable", &found, expected.each_ref(), 3e-3);
     }
 }
 
@@ -264,14 +254,18 @@ fn gaussians_agree_with_their_equations() {
     for terms in [4, 6] {
         let profile = if terms == 4 { Arc::new(Profile::jimenez_four()) } else { skin() };
         let frame = hostile(5);
-        let (mut blurred, mut sum) = (frame.clone(), frame.clone());
-        for step in gauss::steps(&gauss::gaussians(&profile, terms).unwrap()) {
-            let taps = gauss::taps(step.deviation_mm);
-            blurred = blurred.line(&taps, step.deviation_mm, 0).line(&taps, step.deviation_mm, 1);
-            sum = sum.mix(&blurred, step.share);
-        }
+        let steps = gauss::steps(&gauss::gaussians(&profile, terms).unwrap());
+        let expected = TAP_SHIFTS.map(|shift| {
+            let (mut blurred, mut sum) = (frame.clone(), frame.clone());
+            for step in &steps {
+                let (taps, width) = (gauss::taps(step.deviation_mm), step.deviation_mm);
+                blurred = blurred.line(&taps, width, 0, shift).line(&taps, width, 1, shift);
+                sum = sum.mix(&blurred, step.share);
+            }
+            sum
+        });
         let found = run(gpu, ScatterMethod::ScreenGauss(terms as u32), &profile, &frame);
-        assert_close("screen-gauss", &found, &sum, 6e-3);
+        assert_between("screen-gauss", &found, expected.each_ref(), 6e-3);
     }
 }
 
@@ -331,6 +325,7 @@ fn even_light_on_a_plane_stays_even() {
         for tilt in [0.0, 0.3, -1.5] {
             let frame = Frame::new([51, 27], 800.0, |x, _| ([0.7, 1.5, 0.1], 1.0, 400.0 + tilt * x as f64));
             for pixel in run(gpu, method, &skin(), &frame) {
+                let pixel = [pixel[0], pixel[1], pixel[2]];
                 for (found, expected) in pixel.iter().zip([0.7, 1.5, 0.1]) {
                     assert_eq!(*found, half(expected), "{method} {tilt}: {pixel:?}");
                 }
@@ -394,7 +389,7 @@ fn no_strength_changes_nothing() {
         let frame = Frame { strength: vec![0.0; 27 * 51], ..hostile(8) };
         let found = run(gpu, method, &skin(), &frame);
         for (f, e) in found.iter().zip(&frame.color) {
-            assert_eq!([f[0], f[1], f[2], f[3]], [e[0], e[1], e[2], 0.0], "{method}");
+            assert_eq!([f[0], f[1], f[2]], *e, "{method}");
         }
     }
 }
@@ -425,7 +420,10 @@ fn no_light_crosses_a_gap() {
         });
         for (i, p) in run(gpu, method, &skin(), &frame).iter().enumerate() {
             let expected = frame.color[i][0];
-            assert!((0..3).all(|c| (p[c] - expected).abs() < 1e-6), "{method} at {}: {p:?}", i % 61);
+            // A bilinear tap near the plane may hold a little of what is 8 mm away: line.wgsl says how near.
+            let is_linear = matches!(method, ScatterMethod::Separable(_) | ScatterMethod::ScreenGauss(_));
+            let bound = if is_linear { 0.001 * 4.0 } else { 1e-6 };
+            assert!((0..3).all(|c| (p[c] - expected).abs() < bound), "{method} at {}: {p:?}", i % 61);
         }
     }
 }
@@ -470,7 +468,7 @@ fn any_zoom_gives_numbers() {
                     scatter.record(r, images);
                 });
                 for p in found {
-                    assert!(p.iter().all(|v| v.is_finite() && *v >= 0.0), "{method} {focal}: {p:?}");
+                    assert!(p[..3].iter().all(|v| v.is_finite() && *v >= 0.0), "{method} {focal}: {p:?}");
                 }
             }
         }

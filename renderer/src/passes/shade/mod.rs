@@ -33,7 +33,7 @@ use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
-use crate::passes::appearance::Blended;
+use crate::passes::appearance::{Blended, WrinkleMethod};
 use crate::passes::shadow::LightView;
 use crate::scene::{Light, LightKind, MAX_LIGHTS};
 
@@ -125,8 +125,9 @@ pub(crate) struct Params {
     pub(crate) transmit: [f32; 4],
     pub(crate) hair_color: [f32; 4],
     pub(crate) is_second_sample: u32,
+    pub(crate) adds_differences: u32,
     pub(crate) pupil_mm: f32,
-    pub(crate) padding: [u32; 2],
+    pub(crate) padding: u32,
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
@@ -212,6 +213,7 @@ pub(crate) struct Shaded<'a> {
     pub(crate) blended: &'a Blended,
     pub(crate) hemoglobin_scale: f32,
     pub(crate) pupil_mm: f32,
+    pub(crate) wrinkles: WrinkleMethod,
 }
 
 /// The pipeline of the pass.
@@ -394,15 +396,22 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
         // Maps hold true depths; interreflection between pores, which is not drawn, would deepen them to the eye.
         slope_scale: 1.35,
         wrinkle_strength: 1.25,
-        hemoglobin_scale: shaded.hemoglobin_scale,
+        // Finite times finite: blood beyond its range is clamped, but NaN would not be.
+        hemoglobin_scale: shaded.hemoglobin_scale.clamp(-1e6, 1e6),
         head: shaded.index,
         environment_intensity: lighting.environment_intensity,
         environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
         has_maps: u32::from(maps.is_some()),
-        wrinkle_map_count: maps.map_or(0, |m| m.wrinkle_maps),
+        wrinkle_map_count: match shaded.wrinkles {
+            WrinkleMethod::None => 0,
+            WrinkleMethod::PartialDerivative | WrinkleMethod::Difference => {
+                maps.map_or(0, |m| m.wrinkle_maps)
+            }
+        },
         is_second_sample: u32::from(lighting.first.is_some()),
+        adds_differences: u32::from(shaded.wrinkles == WrinkleMethod::Difference),
         pupil_mm: shaded.pupil_mm,
-        padding: [0; 2],
+        padding: 0,
         transmit: lighting
             .transmittance
             .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),

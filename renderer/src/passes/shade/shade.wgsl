@@ -33,10 +33,11 @@ struct Params {
     hair_color: vec4f,
     // 1 where the pixel has a first sample whose light may do for this one.
     is_second_sample: u32,
+    // 1 where differences of normals add instead of slopes.
+    adds_differences: u32,
     // Diameter of the pupils, millimetres.
     pupil_mm: f32,
     padding_1: u32,
-    padding_2: u32,
     // Real spherical harmonics of the environment's irradiance / pi, rgb.
     harmonics: array<vec4f, 9>,
     lights: array<Light, 8>,
@@ -66,9 +67,10 @@ struct Params {
 @group(1) @binding(5) var gloss_map: texture_2d<f32>;
 // rg = slopes, b = variance lost in minification.
 @group(1) @binding(6) var slope_map: texture_2d<f32>;
+// rg = slopes, ba = difference that they make to the unit normal of the relief.
 @group(1) @binding(7) var wrinkle_maps: texture_2d_array<f32>;
 @group(1) @binding(8) var blood: texture_2d<f32>;
-@group(1) @binding(9) var wrinkle_weights: texture_2d<f32>;
+@group(1) @binding(9) var wrinkle_weights: texture_2d_array<f32>;
 @group(1) @binding(10) var skin_color: texture_2d<f32>;
 
 // Diffuse radiance of a white surface; a = scattering strength, 0 where nothing scatters.
@@ -117,7 +119,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
     }
     if seen == 0u {
         if params.head == 0u {
-            textureStore(diffuse_out, id.xy, vec4f(0.0));
+            textureStore(diffuse_out, id.xy, vec4f(0.0, 0.0, 0.0, FAR_MM));
             textureStore(albedo_out, id.xy, vec4f(0.0));
             textureStore(direct_out, id.xy, vec4f(0.0));
         }
@@ -142,11 +144,11 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
     }
 
     if surface.scattering > 0.0 {
-        textureStore(diffuse_out, id.xy, vec4f(diffuse, surface.scattering));
-        textureStore(albedo_out, id.xy, vec4f(surface.albedo, 1.0));
+        textureStore(diffuse_out, id.xy, vec4f(diffuse, relative_depth_mm(view, textureLoad(depth, id.xy, 0))));
+        textureStore(albedo_out, id.xy, vec4f(surface.albedo, surface.scattering));
         textureStore(direct_out, id.xy, vec4f(specular, 1.0));
     } else {
-        textureStore(diffuse_out, id.xy, vec4f(0.0));
+        textureStore(diffuse_out, id.xy, vec4f(0.0, 0.0, 0.0, FAR_MM));
         textureStore(albedo_out, id.xy, vec4f(0.0));
         textureStore(direct_out, id.xy, vec4f(diffuse * surface.albedo + specular, 1.0));
     }
@@ -257,7 +259,44 @@ fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f
 // (Kaplanyan et al. 2016 take a Gaussian of half a pixel's deviation, about this wide).
 const RELIEF_FOOTPRINT = 1.6;
 
-// Wrinkles: papers/004 section 8.2, slopes add up. Hemoglobin: section 7.4.2, written as the neutral value plus
+// Weighted slopes of all wrinkle maps (papers/004 section 8.2).
+fn wrinkle_slopes(uv: vec2f, duv_dx: vec2f, duv_dy: vec2f) -> vec2f {
+    var sum = vec2f(0.0);
+    var weights = vec4f(0.0);
+    for (var i = 0u; i < params.wrinkle_map_count; i++) {
+        if i % 4u == 0u {
+            weights = textureSampleLevel(wrinkle_weights, linear_clamp, uv, i / 4u, 0.0);
+        }
+        if weights[i % 4u] > 0.0 {
+            sum += params.wrinkle_strength * weights[i % 4u]
+                * textureSampleGrad(wrinkle_maps, trilinear_repeat, uv, i, duv_dx, duv_dy).xy;
+        }
+    }
+    return sum;
+}
+
+// Slopes of the relief with weighted differences of normals (papers/004 section 8.2.1). The z of a difference follows
+// from unit length at weight 1, so two channels are stored.
+fn with_differences(slopes: vec2f, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f) -> vec2f {
+    let base = normalize(vec3f(slopes, 1.0));
+    var sum = base;
+    var weights = vec4f(0.0);
+    for (var i = 0u; i < params.wrinkle_map_count; i++) {
+        if i % 4u == 0u {
+            weights = textureSampleLevel(wrinkle_weights, linear_clamp, uv, i / 4u, 0.0);
+        }
+        if weights[i % 4u] > 0.0 {
+            let change = textureSampleGrad(wrinkle_maps, trilinear_repeat, uv, i, duv_dx, duv_dy).zw;
+            let end = base.xy + change;
+            let z = sqrt(max(1.0 - dot(end, end), 0.0));
+            sum += params.wrinkle_strength * weights[i % 4u] * vec3f(change, z - base.z);
+        }
+    }
+    // Slopes up to 87 degrees, as normal maps give.
+    return sum.xy / max(sum.z, 0.05);
+}
+
+// Wrinkles: papers/004 section 8.2. Hemoglobin: section 7.4.2, written as the neutral value plus
 // changes so that neutral weights give the neutral map exactly. Colour: section 7.6.
 fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f, tangent: vec3f, bitangent: vec3f) {
     (*surface).scattering = 1.0;
@@ -270,17 +309,15 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
     let map = textureSampleGrad(skin_map, trilinear_repeat, uv, duv_dx, duv_dy);
     let fine = textureSampleGrad(slope_map, trilinear_repeat, uv, RELIEF_FOOTPRINT * duv_dx, RELIEF_FOOTPRINT * duv_dy);
     var slopes = params.slope_scale * fine.xy;
-    let weights = textureSampleLevel(wrinkle_weights, linear_clamp, uv, 0.0);
-    for (var i = 0u; i < params.wrinkle_map_count; i++) {
-        if weights[i] > 0.0 {
-            slopes += params.wrinkle_strength * weights[i]
-                * textureSampleGrad(wrinkle_maps, trilinear_repeat, uv, i, duv_dx, duv_dy).xy;
-        }
-    }
     let gloss = textureSampleGrad(gloss_map, trilinear_repeat, uv, duv_dx, duv_dy);
     // Lips have lines of their own and no net of furrows; they are what shines most.
     let micro = micro_relief(uv, duv_dx, duv_dy) * smoothstep(0.60, 0.53, gloss.r);
-    slopes += params.slope_scale * micro.xy;
+    if params.adds_differences == 0u {
+        slopes += wrinkle_slopes(uv, duv_dx, duv_dy);
+        slopes += params.slope_scale * micro.xy;
+    } else {
+        slopes = with_differences(slopes + params.slope_scale * micro.xy, uv, duv_dx, duv_dy);
+    }
     (*surface).normal =
         normalize((*surface).smooth_normal + slopes.x * tangent + slopes.y * bitangent);
 

@@ -27,6 +27,7 @@ pub mod coefficients;
 pub mod invert;
 pub mod layers;
 pub mod monte_carlo;
+pub mod published;
 pub mod spectra;
 
 use rayon::prelude::*;

@@ -6,6 +6,9 @@ use super::Crossing;
 pub const DIAGONAL_OFFSETS: [(f64, f64); 5] =
     [(0.0, 0.0), (0.25, -0.25), (-0.25, 0.25), (0.125, -0.125), (-0.125, 0.125)];
 
+/// The offset of the same sample seen in a mirror along the stair.
+pub const OPPOSITE_DIAGONAL_OFFSET: [usize; 5] = [0, 2, 1, 4, 3];
+
 /// Areas are counted on a grid of this many points a side, the pixel's border included.
 const POINTS: usize = 30;
 
@@ -84,4 +87,48 @@ fn covered(from: Point, to: Point, pixel: Point) -> f64 {
         count += POINTS as i32 - first;
     }
     f64::from(count) / (POINTS * POINTS) as f64
+}
+
+/// Exact areas `[below, above]` of the two pixels beside one step of a stair that a straight line left.
+///
+/// The stair has `before` edges before the step in question and `after` behind it, steps and risers taking turns. It
+/// begins and ends with halves of longer steps, both level or both upright, so that both numbers are even or both odd.
+/// The line runs through the middles of the two longer steps, which are the stair's ends: on one side of its centre
+/// line at the beginning, on the other at the end. `offset` moves the sample inside the pixel.
+pub fn stair_area(before: usize, after: usize, offset: (f64, f64)) -> [f64; 2] {
+    debug_assert_eq!(before % 2, after % 2);
+    // The step goes from (0, 0) to (1, 0), y up. With u = x + y along the stair and v = y - x + 1/2 across, the middle
+    // of every edge is at v = 0, and its ends are half a pixel to the sides.
+    let start_v = if before.is_multiple_of(2) { 0.5 } else { -0.5 };
+    let slope = -2.0 * start_v / (before + after + 1) as f64;
+    let shift = offset.1 - offset.0;
+    // How far a point is above the line, in v.
+    let height = |(x, y): Point| {
+        let (u, v) = (x + y, y - x + 0.5);
+        v - shift - start_v - slope * (u + before as f64)
+    };
+    let above = part_below([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], height);
+    let below = 1.0 - part_below([(0.0, -1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0)], height);
+    [below, above]
+}
+
+/// Area of the part of a polygon where `height`, which is linear, is under zero.
+fn part_below(corners: [Point; 4], height: impl Fn(Point) -> f64) -> f64 {
+    let mut kept: Vec<Point> = Vec::with_capacity(6);
+    for (i, &a) in corners.iter().enumerate() {
+        let b = corners[(i + 1) % 4];
+        let (at_a, at_b) = (height(a), height(b));
+        if at_a < 0.0 {
+            kept.push(a);
+        }
+        if (at_a < 0.0) != (at_b < 0.0) {
+            let t = at_a / (at_a - at_b);
+            kept.push((a.0 + t * (b.0 - a.0), a.1 + t * (b.1 - a.1)));
+        }
+    }
+    let cross = |i: usize| {
+        let (a, b) = (kept[i], kept[(i + 1) % kept.len()]);
+        a.0 * b.1 - b.0 * a.1
+    };
+    0.5 * (0..kept.len()).map(cross).sum::<f64>()
 }

@@ -17,14 +17,15 @@
 //!
 //! Differs: the kernels read neither texture. Distances are whole pixels, so [`AreaTable`] holds the value
 //! that a bilinear fetch of the area texture returns for each pair of distances: one read instead of a
-//! square root and a filtered fetch, the same bits on every adapter. The search needs no table at all,
+//! square root and a filtered fetch, the same bits on every adapter. Unless the published values are asked for, it
+//! holds exact areas instead of bytes, and other diagonals ([`stair_area`]). The search needs no table at all,
 //! since edges are kept as bits (see `edges.wgsl`); the search texture serves as an oracle for it.
 
 mod diagonal;
 mod orthogonal;
 mod search;
 
-pub use diagonal::{DIAGONAL_OFFSETS, diagonal_area};
+pub use diagonal::{DIAGONAL_OFFSETS, OPPOSITE_DIAGONAL_OFFSET, diagonal_area, stair_area};
 pub use orthogonal::{ORTHOGONAL_OFFSETS, Smoothing, orthogonal_area};
 pub use search::{SEARCH_HEIGHT, SEARCH_WIDTH, search_texture, search_texture_uncropped};
 
@@ -114,7 +115,8 @@ pub fn mlaa_area_texture() -> Vec<u8> {
 /// An entry packs two 16-bit fractions: the weight of the pixel below (right of) the edge in the low half, that
 /// of the pixel above (left of) it in the high half. `areas` starts with the orthogonal entries at
 /// `((block * 16 + near + 4 * far) * stride + left) * stride + right`; from `diagonal_base` on follow the
-/// diagonal ones at `((block * 16 + near + 4 * far) * 20 + left) * 20 + right`.
+/// diagonal ones at `((block * 16 + near + 4 * far) * 20 + left) * 20 + right` ([`AreaTable::smaa`]) or
+/// `(block * slot + before) * slot + after` with `slot = 2 * steps + 1` ([`AreaTable::exact`]).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AreaTable {
     /// All entries.
@@ -129,9 +131,6 @@ impl AreaTable {
     /// What bilinear fetches of `texture` (from [`area_texture`]) return for distances up to `longest` pixels,
     /// for the given blocks of subsample offsets. Diagonals exist for blocks 0 to 4.
     ///
-    /// In the published texture a diagonal without a crossing edge at one end depends on which end that is;
-    /// `symmetric` takes the mean with the same diagonal turned by 180 degrees.
-    ///
     /// # Panics
     /// When a block does not exist or `longest` is over 225, the last distance in the texture.
     pub fn smaa(
@@ -139,7 +138,6 @@ impl AreaTable {
         longest: usize,
         orthogonal_blocks: &[usize],
         diagonal_blocks: &[usize],
-        symmetric: bool,
     ) -> Self {
         let last = ORTHOGONAL_SLOT - 1;
         assert!(longest <= last * last, "the area texture ends at a distance of {} pixels", last * last);
@@ -182,23 +180,52 @@ impl AreaTable {
             for pattern in 0..16 {
                 for left in 0..DIAGONAL_SLOT {
                     for right in 0..DIAGONAL_SLOT {
-                        let area = |block: usize, near: usize, far: usize, left: usize, right: usize| {
-                            let x = AREA_WIDTH / 2 + near * DIAGONAL_SLOT + left;
-                            let y = block * BLOCK_HEIGHT + far * DIAGONAL_SLOT + right;
-                            [texel(x, y, 0) * 257, texel(x, y, 1) * 257]
-                        };
-                        let (near, far) = (pattern & 3, pattern >> 2);
-                        let mut own = area(block, near, far, left, right);
-                        if symmetric {
-                            // The same stair turned upside down: ends, sides and the sample's place swap.
-                            let opposite = [0, 2, 1, 4, 3][block];
-                            let turned = area(opposite, far, near, right, left);
-                            own = [(own[0] + turned[1]) / 2, (own[1] + turned[0]) / 2];
-                        }
-                        areas.push(own[0] | (own[1] << 16));
+                        let x = AREA_WIDTH / 2 + (pattern & 3) * DIAGONAL_SLOT + left;
+                        let y = block * BLOCK_HEIGHT + (pattern >> 2) * DIAGONAL_SLOT + right;
+                        areas.push((texel(x, y, 0) * 257) | (texel(x, y, 1) * 257) << 16);
                     }
                 }
             }
+        }
+        Self { areas, stride: stride as u32, diagonal_base }
+    }
+
+    /// Exact areas for distances up to `longest` pixels and stairs of up to `2 * steps` edges to each side of an edge,
+    /// for the given blocks of subsample offsets. Stairs exist for blocks 0 to 4.
+    ///
+    /// # Panics
+    /// When a block does not exist.
+    pub fn exact(
+        longest: usize,
+        steps: usize,
+        orthogonal_blocks: &[usize],
+        diagonal_blocks: &[usize],
+    ) -> Self {
+        // Halves go up in spite of rounding, so that mirrored patterns have the same areas.
+        let pack = |area: [f64; 2]| {
+            let [low, high] = area.map(|part| (part.clamp(0.0, 1.0) * 65535.0 + 0.5 + 1e-6).floor() as u32);
+            low | high << 16
+        };
+        let (stride, slot) = (longest + 1, 2 * steps + 1);
+        let orthogonal = orthogonal_blocks.par_iter().flat_map_iter(|&block| {
+            (0..16 * stride * stride).map(move |i| {
+                let (pattern, left, right) = (i / (stride * stride), i / stride % stride, i % stride);
+                let (near, far) = (pattern as Crossing & 3, pattern as Crossing >> 2);
+                let offset = ORTHOGONAL_OFFSETS[block];
+                pack(orthogonal_area(near, far, left, right, offset, Smoothing::None))
+            })
+        });
+        let mut areas: Vec<u32> = orthogonal.collect();
+        let diagonal_base = areas.len() as u32;
+        if steps > 0 {
+            areas.extend(diagonal_blocks.iter().flat_map(|&block| {
+                (0..slot * slot).map(move |i| {
+                    let (before, after) = (i / slot, i % slot);
+                    // Ends that differ are no straight line.
+                    let line = before % 2 == after % 2;
+                    if line { pack(stair_area(before, after, DIAGONAL_OFFSETS[block])) } else { 0 }
+                })
+            }));
         }
         Self { areas, stride: stride as u32, diagonal_base }
     }

@@ -84,7 +84,7 @@ fn orthogonal_areas_are_mirrored_with_their_lines() {
 #[test]
 fn the_table_holds_texels_at_square_distances_and_mixes_between() {
     let texture = area_texture();
-    let table = AreaTable::smaa(&texture, 16, &[0, 3], &[0], false);
+    let table = AreaTable::smaa(&texture, 16, &[0, 3], &[0]);
     assert_eq!(table.stride, 17);
     assert_eq!(table.areas.len(), 2 * 16 * 17 * 17 + 16 * 20 * 20);
     let entry = |block: usize, pattern: usize, left: usize, right: usize| {
@@ -112,4 +112,35 @@ fn the_mlaa_table_covers_nine_distances() {
     let table = AreaTable::mlaa(&texture);
     // Crossing above near, 3 pixels more to the right: 0.375 of 255, cut off.
     assert_eq!(table.areas[9 * 9 + 3] >> 16, 95 * 257);
+}
+
+#[test]
+fn stairs_have_the_area_under_their_line() {
+    for (before, after) in (0..9).flat_map(|b| (0..9).map(move |a| (b, a))).filter(|(b, a)| b % 2 == a % 2) {
+        for block in 0..5 {
+            let [below, above] = stair_area(before, after, DIAGONAL_OFFSETS[block]);
+            assert!((0.0..=1.0).contains(&below) && (0.0..=1.0).contains(&above));
+            // Turned by 180 degrees: ends, sides and the sample's place swap.
+            let opposite = DIAGONAL_OFFSETS[OPPOSITE_DIAGONAL_OFFSET[block]];
+            let turned = stair_area(after, before, opposite);
+            assert!((below - turned[1]).abs() < 1e-12 && (above - turned[0]).abs() < 1e-12);
+            // The same area by counting points.
+            let points = 200;
+            let (fx, fy) = DIAGONAL_OFFSETS[block];
+            let start = if before % 2 == 0 { 0.5 } else { -0.5 };
+            let (length, shift) = ((before + after + 1) as f64, fy - fx);
+            let counted = (0..points * points)
+                .filter(|i| {
+                    let at = |i: usize| (i as f64 + 0.5) / points as f64;
+                    let (x, y) = (at(i % points), at(i / points));
+                    let along = (x + y + before as f64) / length;
+                    y - x + 0.5 < shift + start * (1.0 - 2.0 * along)
+                })
+                .count();
+            assert!((above - counted as f64 / (points * points) as f64).abs() < 0.005);
+        }
+    }
+    // At 45 degrees through the middles of all edges each pixel has a corner of 1/8.
+    let endless = stair_area(4000, 4000, (0.0, 0.0));
+    assert!(endless.iter().all(|area| (area - 0.125).abs() < 1e-3), "{endless:?}");
 }

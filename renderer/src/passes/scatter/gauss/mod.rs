@@ -128,10 +128,10 @@ impl ScreenGauss {
             let next_sum = if (last - i).is_multiple_of(2) { images.scattered } else { &own.sum };
             let next = &own.blurred[i % 2];
             let step = [blurred, images.scratch];
-            self.horizontal.record(r.gpu, r.encoder, r.timer, r.view, params, images.depth, step, None);
+            self.horizontal.record(r.gpu, r.encoder, r.timer, r.view, params, images, step, None);
             let step = [images.scratch, next];
             let sums = Some([sum, next_sum]);
-            self.vertical.record(r.gpu, r.encoder, r.timer, r.view, params, images.depth, step, sums);
+            self.vertical.record(r.gpu, r.encoder, r.timer, r.view, params, images, step, sums);
             (blurred, sum) = (next, next_sum);
         }
     }

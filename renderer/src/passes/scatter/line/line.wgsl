@@ -1,13 +1,12 @@
-// One direction of a separable kernel, tile by tile. Concatenated after view.wgsl, common.wgsl and the constants
-// VERTICAL (which direction) and ACCUMULATE (whether the result is also blended into a sum).
+// One direction of a separable kernel. Concatenated after view.wgsl, common.wgsl and the constants VERTICAL (which
+// direction) and ACCUMULATE (whether the result is also blended into a sum).
 
 struct Params {
     pair_count: u32,
     follow_per_mm: f32,
-    // Offset of the last tap.
-    half_width_mm: f32,
     // A pixel on which this is shorter than half a pixel keeps its light.
     visible_mm: f32,
+    padding: f32,
     // rgb = share of the result in the sum (papers/004 eq. 4.8).
     share: vec4f,
     // rgb = weight of a tap on either side, w = its offset in mm, ascending. The centre has what is left to one.
@@ -16,52 +15,44 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> params: Params;
+// rgb, a = depth in mm from view.depth_origin_mm on.
 @group(0) @binding(2) var source: texture_2d<f32>;
-@group(0) @binding(3) var depth: texture_depth_2d;
-@group(0) @binding(4) var target_image: texture_storage_2d<rgba16float, write>;
-//ACCUMULATE @group(0) @binding(5) var sum_before: texture_2d<f32>;
-//ACCUMULATE @group(0) @binding(6) var sum_after: texture_storage_2d<rgba16float, write>;
+// a = strength of scattering.
+@group(0) @binding(3) var albedo: texture_2d<f32>;
+@group(0) @binding(4) var depth: texture_depth_2d;
+@group(0) @binding(5) var linear: sampler;
+@group(0) @binding(6) var target_image: texture_storage_2d<rgba16float, write>;
+//ACCUMULATE @group(0) @binding(7) var sum_before: texture_2d<f32>;
+//ACCUMULATE @group(0) @binding(8) var sum_after: texture_storage_2d<rgba16float, write>;
+
+// A sample as near to the tangent plane as this, or as a surface with a radius of 25 mm would be, is of one surface.
+const PLANE_MM = 0.1;
+const CURVATURE_PER_MM = 0.02;
+// One that is farther than this has nothing of skin.
+const ALL_FAR_MM = 0.99 * FAR_MM;
 
 const THREADS = 128u;
-// A tile is LENGTH pixels along the blur and LINES across.
-const LENGTH = 64u;
-const LINES = 8u;
-const PIXELS_PER_THREAD = 4u;
-// Pixels before and after a tile that fit into workgroup memory; wider kernels read the images.
-const APRON = 48u;
-const SLOTS = 1280u;
+// A workgroup does 4 x 1 blocks of 8 x 8 pixels.
+const BLOCKS_IN_GROUP = 4u;
+const BLOCK_PIXELS = 64u;
 
-var<workgroup> widest: atomic<u32>;
-var<workgroup> tile_reach: u32;
-// rgb and strength as four halves: exact, as the image holds halves.
-var<workgroup> colors: array<vec2u, SLOTS>;
-var<workgroup> depths_mm: array<f32, SLOTS>;
+// Pixels of a block in Z-order: neighbouring invocations are neighbours both ways, whichever way the kernel runs.
+fn z_order(i: u32) -> vec2u {
+    return vec2u(
+        (i & 1u) | ((i >> 1u) & 2u) | ((i >> 2u) & 4u),
+        ((i >> 1u) & 1u) | ((i >> 2u) & 2u) | ((i >> 3u) & 4u),
+    );
+}
 
-// Pixel number `index` of a span of lines: x = along, y = across. Neighbours in x are neighbouring threads.
-fn place(index: u32, span: u32) -> vec2u {
-    if VERTICAL {
-        return vec2u(index / LINES, index % LINES);
+@compute @workgroup_size(THREADS)
+fn scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
+    for (var i = thread; i < BLOCKS_IN_GROUP * BLOCK_PIXELS; i += THREADS) {
+        let block = vec2u(BLOCKS_IN_GROUP * group.x + i / BLOCK_PIXELS, group.y);
+        let at = 8u * block + z_order(i % BLOCK_PIXELS);
+        if all(at < view.size) {
+            put(vec2i(at), blur(vec2i(at)));
+        }
     }
-    return vec2u(index % span, index / span);
-}
-
-fn slot(at: vec2u, span: u32) -> u32 {
-    return select(at.y * span + at.x, at.x * LINES + at.y, VERTICAL);
-}
-
-fn image_position(tile: vec2u, along: i32, line: u32) -> vec2i {
-    if VERTICAL {
-        return vec2i(i32(tile.x * LINES + line), i32(tile.y * LENGTH) + along);
-    }
-    return vec2i(i32(tile.x * LENGTH) + along, i32(tile.y * LINES + line));
-}
-
-fn color_at(at: vec2i) -> vec4f {
-    return min(textureLoad(source, at, 0), vec4f(HALF_MAX));
-}
-
-fn depth_at(at: vec2i, strength: f32) -> f32 {
-    return skin_depth_mm(view, textureLoad(depth, at, 0), strength);
 }
 
 fn put(at: vec2i, color: vec4f) {
@@ -70,147 +61,57 @@ fn put(at: vec2i, color: vec4f) {
     //ACCUMULATE textureStore(sum_after, at, vec4f(before.rgb + params.share.rgb * (color.rgb - before.rgb), color.a));
 }
 
-@compute @workgroup_size(THREADS)
-fn scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) thread: u32) {
-    let tile = group.xy;
-    let size = vec2i(view.size);
-    if thread == 0u {
-        atomicStore(&widest, 0u);
-    }
-    workgroupBarrier();
-    for (var i = 0u; i < PIXELS_PER_THREAD; i++) {
-        let local = place(thread + i * THREADS, LENGTH);
-        let at = image_position(tile, i32(local.x), local.y);
-        if all(at < size) {
-            let strength = textureLoad(source, at, 0).a;
-            if strength > 0.0 {
-                let scale = strength * pixels_per_mm(view, depth_at(at, strength));
-                if params.visible_mm * scale >= 0.5 {
-                    atomicMax(&widest, u32(ceil(min(params.half_width_mm * scale, MAX_REACH))) + 1u);
-                }
-            }
-        }
-    }
-    workgroupBarrier();
-    if thread == 0u {
-        tile_reach = atomicLoad(&widest);
-    }
-    let reach = workgroupUniformLoad(&tile_reach);
-    let fits = reach <= APRON;
-    let span = LENGTH + 2u * reach;
-    if reach > 0u && fits {
-        for (var i = thread; i < span * LINES; i += THREADS) {
-            let local = place(i, span);
-            let at = clamp(image_position(tile, i32(local.x) - i32(reach), local.y), vec2i(0), size - 1);
-            let color = color_at(at);
-            let s = slot(local, span);
-            colors[s] = vec2u(pack2x16float(color.rg), pack2x16float(color.ba));
-            depths_mm[s] = depth_at(at, color.a);
-        }
-    }
-    workgroupBarrier();
-    for (var i = 0u; i < PIXELS_PER_THREAD; i++) {
-        let local = place(thread + i * THREADS, LENGTH);
-        let at = image_position(tile, i32(local.x), local.y);
-        if any(at >= size) {
-            continue;
-        }
-        if reach == 0u {
-            put(at, textureLoad(source, at, 0));
-        } else if fits {
-            put(at, blur_tile(local + vec2u(reach, 0u), span));
-        } else {
-            put(at, blur_image(at));
-        }
-    }
+fn depth_at(at: vec2i) -> f32 {
+    return depth_mm(view, textureLoad(depth, clamp(at, vec2i(0), vec2i(view.size) - 1), 0));
 }
 
-// The same without workgroup memory: faster where a barrier is expensive (software adapters).
-@compute @workgroup_size(8, 8)
-fn scatter_untiled(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= view.size) {
-        return;
-    }
-    let at = vec2i(id.xy);
-    let raw = textureLoad(source, at, 0);
-    if raw.a <= 0.0 {
-        put(at, raw);
-        return;
-    }
-    put(at, blur_image(at));
-}
-
-// What a texel changes at the centre, faded by its distance from the tangent plane. Differences keep even light even to
+// What light changes at the centre, faded by its distance from the tangent plane. Differences keep even light even to
 // the last bit.
-fn tile_change(s: u32, center: vec3f, expected_mm: f32, share: f32) -> vec3f {
-    let k = share * follow(depths_mm[s] - expected_mm, params.follow_per_mm);
-    let c = colors[s];
-    return k * (vec3f(unpack2x16float(c.x), unpack2x16float(c.y).x) - center);
+fn change(light: vec4f, center: vec4f, expected_mm: f32) -> vec3f {
+    return follow(light.a - expected_mm, params.follow_per_mm) * (min(light.rgb, vec3f(HALF_MAX)) - center.rgb);
 }
 
-fn blur_tile(local: vec2u, span: u32) -> vec4f {
-    let stride = select(1u, LINES, VERTICAL);
-    let s = slot(local, span);
-    let c = vec4f(unpack2x16float(colors[s].x), unpack2x16float(colors[s].y));
-    let here = depths_mm[s];
+fn texel(at: vec2i) -> vec4f {
+    return textureLoad(source, clamp(at, vec2i(0), vec2i(view.size) - 1), 0);
+}
+
+// A tap x pixels along the line. On the tangent plane one bilinear sample of light and depth is enough; off it, the two
+// texels may be of two surfaces, and each goes by its own depth.
+fn tap(at: vec2i, x: f32, center: vec4f, slope: f32, plane_mm: f32) -> vec3f {
+    let axis = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
+    let place = (vec2f(at) + 0.5 + x * vec2f(axis)) / vec2f(view.size);
+    let light = textureSampleLevel(source, linear, place, 0.0);
+    let expected_mm = center.a + slope * x;
+    if abs(light.a - expected_mm) <= plane_mm || light.a > ALL_FAR_MM {
+        return change(light, center, expected_mm);
+    }
+    let low = floor(x);
+    let before = change(texel(at + i32(low) * axis), center, center.a + slope * low);
+    let after = change(texel(at + (i32(low) + 1) * axis), center, center.a + slope * (low + 1.0));
+    return mix(before, after, x - low);
+}
+
+fn blur(at: vec2i) -> vec4f {
+    let raw = textureLoad(source, at, 0);
+    if raw.a >= NO_SKIN_MM {
+        return raw;
+    }
+    let center = vec4f(min(raw.rgb, vec3f(HALF_MAX)), raw.a);
+    let strength = textureLoad(albedo, at, 0).a;
+    let here = depth_at(at);
     let per_mm = pixels_per_mm(view, here);
-    if c.a * per_mm * params.visible_mm < 0.5 {
-        return c;
+    if strength <= 0.0 || strength * per_mm * params.visible_mm < 0.5 {
+        return center;
     }
-    let slope = surface_slope(depths_mm[s - stride], here, depths_mm[s + stride], per_mm);
-    let scale = c.a * per_mm * foreshortening(slope, per_mm);
-    var result = c.rgb;
-    for (var i = 0u; i < params.pair_count; i++) {
-        let pair = params.pairs[i];
-        let x = pair.w * scale;
-        let whole = floor(x);
-        let fraction = x - whole;
-        let step = u32(whole) * stride;
-        let rise = slope * whole;
-        // Two texels on the line on either side, weighted by distance.
-        let change = tile_change(s + step, c.rgb, here + rise, 1.0 - fraction)
-            + tile_change(s + step + stride, c.rgb, here + rise + slope, fraction)
-            + tile_change(s - step, c.rgb, here - rise, 1.0 - fraction)
-            + tile_change(s - step - stride, c.rgb, here - rise - slope, fraction);
-        result += pair.rgb * change;
-    }
-    return vec4f(result, c.a);
-}
-
-fn image_change(at: vec2i, center: vec3f, expected_mm: f32, share: f32) -> vec3f {
-    let p = clamp(at, vec2i(0), vec2i(view.size) - 1);
-    let c = color_at(p);
-    return share * follow(depth_at(p, c.a) - expected_mm, params.follow_per_mm) * (c.rgb - center);
-}
-
-fn image_depth(at: vec2i) -> f32 {
-    let p = clamp(at, vec2i(0), vec2i(view.size) - 1);
-    return depth_at(p, textureLoad(source, p, 0).a);
-}
-
-fn blur_image(at: vec2i) -> vec4f {
-    let stride = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
-    let c = color_at(at);
-    let here = depth_at(at, c.a);
-    let per_mm = pixels_per_mm(view, here);
-    if c.a * per_mm * params.visible_mm < 0.5 {
-        return c;
-    }
-    let slope = surface_slope(image_depth(at - stride), here, image_depth(at + stride), per_mm);
-    let scale = c.a * per_mm * foreshortening(slope, per_mm);
-    var result = c.rgb;
+    let axis = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
+    let slope = surface_slope(depth_at(at - axis), here, depth_at(at + axis), per_mm);
+    let scale = strength * per_mm * foreshortening(slope, per_mm);
+    var result = center.rgb;
     for (var i = 0u; i < params.pair_count; i++) {
         let pair = params.pairs[i];
         let x = min(pair.w * scale, MAX_REACH);
-        let whole = floor(x);
-        let fraction = x - whole;
-        let step = i32(whole) * stride;
-        let rise = slope * whole;
-        let change = image_change(at + step, c.rgb, here + rise, 1.0 - fraction)
-            + image_change(at + step + stride, c.rgb, here + rise + slope, fraction)
-            + image_change(at - step, c.rgb, here - rise, 1.0 - fraction)
-            + image_change(at - step - stride, c.rgb, here - rise - slope, fraction);
-        result += pair.rgb * change;
+        let plane_mm = max(PLANE_MM, CURVATURE_PER_MM * pair.w * pair.w);
+        result += pair.rgb * (tap(at, x, center, slope, plane_mm) + tap(at, -x, center, slope, plane_mm));
     }
-    return vec4f(result, c.a);
+    return vec4f(result, center.a);
 }

@@ -204,6 +204,7 @@ pub(crate) struct Inputs<'a> {
     pub(crate) view: &'a wgpu::Buffer,
     pub(crate) ids: &'a wgpu::TextureView,
     pub(crate) irradiance: &'a wgpu::TextureView,
+    pub(crate) albedo: &'a wgpu::TextureView,
     pub(crate) depth: &'a wgpu::TextureView,
     pub(crate) scattered: &'a wgpu::TextureView,
 }
@@ -298,6 +299,7 @@ impl Surface {
                     lit.as_entire_binding(),
                     self.sums.as_entire_binding(),
                     self.squares.as_entire_binding(),
+                    texture(inputs.albedo),
                 ],
             );
             {
@@ -328,7 +330,7 @@ impl Surface {
             (0, inputs.view.as_entire_binding()),
             (3, texture(inputs.irradiance)),
             (9, self.sums.as_entire_binding()),
-            (11, texture(inputs.scattered)),
+            (12, texture(inputs.scattered)),
         ]
         .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {

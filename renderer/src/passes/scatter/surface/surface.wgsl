@@ -26,6 +26,8 @@ struct SurfaceSample {
 @group(0) @binding(1) var<uniform> params: Params;
 @group(0) @binding(2) var visible: texture_2d<u32>;
 @group(0) @binding(3) var irradiance: texture_2d<f32>;
+// a = strength of scattering.
+@group(0) @binding(11) var albedo: texture_2d<f32>;
 @group(0) @binding(4) var depth: texture_depth_2d;
 // R (rgb, mm^-2) at radii (i / (n - 1))^2 half_width_mm.
 @group(0) @binding(5) var<storage, read> profile: array<vec4f>;
@@ -35,7 +37,7 @@ struct SurfaceSample {
 @group(0) @binding(8) var<storage, read> light: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> sums: array<vec4f>;
 @group(0) @binding(10) var<storage, read_write> squares: array<vec4f>;
-@group(0) @binding(11) var scattered: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(12) var scattered: texture_storage_2d<rgba16float, write>;
 
 // Strength under which light counts as unscattered.
 const LEAST_STRENGTH = 0.02;
@@ -49,7 +51,7 @@ fn profile_at(r_mm: f32) -> vec3f {
 
 fn is_scattering(at: vec2u) -> bool {
     let seen = textureLoad(visible, at, 0).x;
-    return seen != 0u && (seen >> 27u) == params.head && textureLoad(irradiance, at, 0).a > LEAST_STRENGTH;
+    return seen != 0u && (seen >> 27u) == params.head && textureLoad(albedo, at, 0).a > LEAST_STRENGTH;
 }
 
 @compute @workgroup_size(8, 8)
@@ -57,7 +59,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= view.size) || !is_scattering(id.xy) {
         return;
     }
-    let center = textureLoad(irradiance, id.xy, 0);
+    let center = vec4f(textureLoad(irradiance, id.xy, 0).rgb, textureLoad(albedo, id.xy, 0).a);
     let ray = pixel_ray(view, vec2f(id.xy) + 0.5, view.jitter);
     let metres = view.origin.xyz - params.origin + ray * view_depth(view, textureLoad(depth, id.xy, 0));
     let p = 1e3 * metres;

@@ -67,6 +67,7 @@ fn draw(
         size: [pixels; 2],
         scatter,
         transmit,
+        appearance: Default::default(),
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
         supersampling: 1,

@@ -1,0 +1,158 @@
+//! A head by itself.
+
+use std::collections::BTreeMap;
+
+use rubor_rig::head::{Head, Material};
+use rubor_rig::names::{ARKIT, Key, Resolver, canonical, is_known_shape, nearest, vocabulary};
+
+use super::{Finding, list};
+
+/// Heights of heads with and without a neck and shoulders, metres.
+const HEIGHTS_METRES: std::ops::RangeInclusive<f32> = 0.1..=0.8;
+/// A shape that moves no point further than this shows nothing, metres.
+const LEAST_OFFSET_METRES: f32 = 1e-5;
+/// A shape that moves a point by more than this part of the head's height is in another unit.
+const MOST_OFFSET: f32 = 0.6;
+
+/// Geometry, names and shapes.
+pub fn check(head: &Head) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    if let Err(e) = head.validate() {
+        findings.push(Finding::error("", e.to_string()));
+        return findings;
+    }
+    size(head, &mut findings);
+    parts(head, &mut findings);
+    triangles(head, &mut findings);
+    shapes(head, &mut findings);
+    names(head, &mut findings);
+    if head.landmarks.is_empty() {
+        let message =
+            "there are no landmarks: synthesised maps and camera framing guess the face from its size";
+        findings.push(Finding::note("landmarks", message));
+    }
+    findings
+}
+
+fn size(head: &Head, findings: &mut Vec<Finding>) {
+    let height = head.height();
+    if height > 0.0 && !HEIGHTS_METRES.contains(&height) {
+        let unit = [("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254)]
+            .into_iter()
+            .find(|(_, metres)| HEIGHTS_METRES.contains(&(height * metres)));
+        let message = format!(
+            "the head is {height:.3} m high, where {} to {} m are likely: scattering would be far too sharp or soft",
+            HEIGHTS_METRES.start(),
+            HEIGHTS_METRES.end()
+        );
+        let finding = Finding::warning("mesh", message);
+        findings.push(match unit {
+            Some((unit, factor)) => {
+                finding.fix(format!("it looks like {unit}: scale the mesh by {factor} before import"))
+            }
+            None => finding.fix("scale the mesh to metres before import"),
+        });
+    }
+}
+
+fn parts(head: &Head, findings: &mut Vec<Finding>) {
+    if !head.mesh.parts.iter().any(|p| p.material == Material::Skin) {
+        let message = "no part is skin: blood, wrinkles and scattering show nowhere";
+        findings.push(
+            Finding::warning("parts", message)
+                .fix("name the material of the face with a word such as skin, face or head"),
+        );
+    }
+    let other: Vec<&str> =
+        (head.mesh.parts.iter()).filter(|p| p.material == Material::Other).map(|p| p.name.as_str()).collect();
+    if !other.is_empty() {
+        let message = format!("the material of {} is not known: drawn diffuse grey", list(&other));
+        findings.push(
+            Finding::note("parts", message)
+                .fix("name materials with words such as skin, eye, teeth, gums, lash, hair"),
+        );
+    }
+}
+
+fn triangles(head: &Head, findings: &mut Vec<Finding>) {
+    let mesh = &head.mesh;
+    let point = |v: u32| mesh.points[mesh.vertices[v as usize].point as usize];
+    let flat = (mesh.triangles.iter())
+        .filter(|t| {
+            let [a, b, c] = t.map(point);
+            (b - a).cross(c - a) == glam::Vec3::ZERO
+        })
+        .count();
+    if flat > 0 {
+        findings.push(Finding::note("mesh", format!("{flat} triangles have no area: they are never seen")));
+    }
+    let skin = mesh.parts.iter().filter(|p| p.material == Material::Skin);
+    let corners = skin.flat_map(|p| {
+        mesh.triangles[p.triangles.start as usize..p.triangles.end as usize].as_flattened().iter()
+    });
+    let uvs: Vec<glam::Vec2> = corners.map(|v| mesh.vertices[*v as usize].uv).collect();
+    if !uvs.is_empty() && uvs.iter().all(|uv| *uv == uvs[0]) {
+        let message = "the skin has no texture coordinates: every map shows one texel";
+        findings.push(Finding::warning("mesh", message).fix("unwrap the mesh before import"));
+    } else if uvs.iter().any(|uv| uv.min_element() < -1e-4 || uv.max_element() > 1.0001) {
+        let message =
+            "texture coordinates of the skin leave 0 to 1: maps repeat there, low-resolution ones do not";
+        findings.push(Finding::warning("mesh", message).fix("keep the skin in one tile"));
+    }
+}
+
+fn shapes(head: &Head, findings: &mut Vec<Finding>) {
+    if head.shapes.is_empty() {
+        findings.push(
+            Finding::warning("shapes", "there are none: the face cannot move")
+                .fix("export morph targets (glTF) or blendShape targets (Maya) with the mesh"),
+        );
+    }
+    let limit = MOST_OFFSET * head.height();
+    for shape in &head.shapes {
+        let at = format!("shape {:?}", shape.name);
+        let longest = shape.offsets.iter().map(|o| o.length()).fold(0.0, f32::max);
+        if shape.points.is_empty() {
+            let message = "it moves no points: its weight has no effect";
+            findings
+                .push(Finding::warning(at, message).fix("delete the shape, or sculpt and export it again"));
+        } else if longest < LEAST_OFFSET_METRES {
+            let message = format!("it moves points by {:.4} mm at most, which nobody sees", longest * 1000.0);
+            findings.push(Finding::warning(at, message).fix("check the unit of its offsets"));
+        } else if limit > 0.0 && longest > limit {
+            let message = format!(
+                "it moves a point by {longest:.3} m, {:.0} % of the head's height",
+                100.0 * longest / head.height()
+            );
+            findings.push(
+                Finding::warning(at, message)
+                    .fix("check the unit of its offsets, or that it is relative to the neutral mesh"),
+            );
+        }
+    }
+}
+
+fn names(head: &Head, findings: &mut Vec<Finding>) {
+    let mut seen: BTreeMap<Key, &str> = BTreeMap::new();
+    for shape in &head.shapes {
+        let at = || format!("shape {:?}", shape.name);
+        let key = Key::new(canonical(&shape.name).unwrap_or(&shape.name));
+        if let Some(earlier) = seen.insert(key, &shape.name) {
+            let message = format!("{earlier:?} is the same name: only the first of them is driven by it");
+            findings.push(Finding::warning(at(), message).fix("rename one of them"));
+        }
+        if !is_known_shape(&shape.name)
+            && let Some(near) = nearest(&shape.name, vocabulary())
+            && head.shape_index(&near).is_none()
+        {
+            let message = "no expression and no capture knows this name";
+            findings.push(Finding::note(at(), message).fix(format!("if it is {near:?}, rename it")));
+        }
+    }
+    let resolver = Resolver::shapes(head);
+    let missing: Vec<&str> = ARKIT.into_iter().filter(|n| resolver.resolve(n).is_empty()).collect();
+    if !head.shapes.is_empty() && !missing.is_empty() {
+        let message = format!("{} of the 52 ARKit shapes are missing: {}", missing.len(), list(&missing));
+        findings.push(Finding::note("shapes", message));
+    }
+}

@@ -1,0 +1,193 @@
+//! Every reason by a head that has only this fault.
+
+use glam::{Vec2, Vec3};
+use rubor_rig::evaluate::Evaluator;
+use rubor_rig::expression::Rig;
+use rubor_rig::head::{BlendShape, Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
+use rubor_rig::map::Map;
+use rubor_rig::timeline::Sequence;
+
+use super::visibility::{self, Scene};
+use super::{Finding, Severity, capture, head, performance};
+use crate::import::capture::{Retarget, live_link};
+
+/// A square of skin, 0.25 m high, whose zone and distribution show.
+fn good() -> Head {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let mesh = Mesh {
+        points: corners.map(|[x, y]| 0.25 * Vec3::new(x, y, 0.0)).to_vec(),
+        vertices: (0..4)
+            .map(|i| Vertex { point: i, uv: Vec2::from_array(corners[i as usize]) * 0.4 })
+            .collect(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        parts: vec![Part { name: "skin".into(), material: Material::Skin, triangles: 0..2 }],
+        ..Mesh::default()
+    };
+    let shape = BlendShape { name: "jawOpen".into(), points: vec![0], offsets: vec![Vec3::Y * 0.01] };
+    let flat = |v: &[f32]| Map::filled(8, 8, v);
+    let maps = SkinMaps {
+        melanin: Some(flat(&[0.05])),
+        hemoglobin: Some(flat(&[0.05])),
+        hemoglobin_mean: Some(flat(&[0.05])),
+        distributions: vec![Distribution { name: "joy".into(), scale: flat(&[1.0]), bias: flat(&[0.1]) }],
+        wrinkle_slopes: vec![flat(&[0.5, 0.5])],
+        zones: vec![WrinkleZone { name: "chin".into(), wrinkle_map: 0, mask: flat(&[1.0]) }],
+        ..SkinMaps::default()
+    };
+    Head { name: "good".into(), mesh, shapes: vec![shape], maps, ..Head::default() }
+}
+
+const RIG: &str = r#"{"expressions": {
+    "joy": {"shapes": {"jawOpen": 1}, "wrinkles": {"chin": 1}, "hemoglobin": {"joy": 1}},
+    "calm": {"shapes": {"jawOpen": 0.1}, "wrinkles": {"chin": -1}}
+}}"#;
+
+fn visible(head: &Head, rig: &str, sequence: Option<&str>) -> Vec<String> {
+    let rig = Rig::from_json("rig.json", rig).unwrap();
+    let sequence = sequence.map(|s| {
+        let text = format!(r#"{{"fps": 4, "duration": 1, "expressions": {s}}}"#);
+        Sequence::from_json("s.json", &text).unwrap()
+    });
+    let evaluator = sequence.map(|s| Evaluator::new(head, &rig, &s).unwrap().0);
+    let scene = Scene { head, rig: &rig, evaluator: evaluator.as_ref() };
+    visibility::check(&scene).iter().map(ToString::to_string).collect()
+}
+
+fn says(findings: &[String], words: &[&str]) {
+    assert!(
+        words.iter().all(|w| findings.iter().any(|f| f.contains(w))),
+        "{findings:?} lacks one of {words:?}"
+    );
+}
+
+#[test]
+fn a_good_head_has_nothing_to_hide() {
+    assert_eq!(visible(&good(), RIG, None), [""; 0]);
+    assert_eq!(visible(&good(), RIG, Some(r#"{"joy": 1}"#)), [""; 0]);
+    assert!(head::check(&good()).iter().all(|f| f.severity == Severity::Note));
+}
+
+#[test]
+fn why_a_wrinkle_zone_does_not_show() {
+    let with = |change: &dyn Fn(&mut Head)| {
+        let mut head = good();
+        change(&mut head);
+        visible(&head, RIG, None)
+    };
+    says(&with(&|h| h.maps.wrinkle_slopes.clear()), &["zone \"chin\"", "wrinkle map 0 is missing"]);
+    says(&with(&|h| h.maps.wrinkle_slopes[0] = Map::filled(8, 8, &[0.0; 2])), &["strength 0"]);
+    says(&with(&|h| h.maps.zones[0].mask = Map::filled(8, 8, &[0.0])), &["mask is black"]);
+    // The skin uses the upper left part of the texture only.
+    let corner = |h: &mut Head| {
+        h.maps.zones[0].mask.values.fill(0.0);
+        h.maps.zones[0].mask.values[63] = 1.0;
+    };
+    says(&with(&corner), &["texels that no skin uses"]);
+    says(&with(&|h| h.maps.melanin = None), &["no melanin map"]);
+    says(&with(&|h| h.mesh.parts[0].material = Material::Other), &["no part is skin"]);
+    says(&visible(&good(), &RIG.replace("\"chin\": 1", "\"chinn\": 1"), None), &["0 or negative"]);
+    says(&visible(&good(), &RIG.replace("\"chin\"", "\"chinn\""), None), &["nothing in the rig names it"]);
+    says(
+        &visible(&good(), RIG, Some(r#"{"calm": 1}"#)),
+        &["wrinkle zones: the sequence never reaches 1", "chin (joy)"],
+    );
+    says(&visible(&good(), RIG, Some(r#"{"joy": 1, "calm": 1}"#)), &["joy raise it and calm take it away"]);
+}
+
+#[test]
+fn why_a_distribution_does_not_show() {
+    let mut head = good();
+    head.maps.distributions[0].bias = Map::filled(8, 8, &[0.05]);
+    says(&visible(&head, RIG, None), &["distribution \"joy\": it is the neutral one"]);
+    let renamed = RIG.replace("\"hemoglobin\": {\"joy\": 1}", "\"hemoglobin\": {\"jooy\": 1}");
+    says(&visible(&good(), &renamed, None), &["distribution \"joy\": nothing in the rig names it"]);
+    says(
+        &visible(&good(), RIG, Some(r#"{"calm": 1}"#)),
+        &["distributions: the sequence never reaches 1", "joy (joy)"],
+    );
+}
+
+fn texts(findings: &[Finding]) -> Vec<String> {
+    findings.iter().map(|f| format!("{f} [{}]", f.fix.clone().unwrap_or_default())).collect()
+}
+
+#[test]
+fn heads_of_wrong_size_shape_and_name() {
+    let mut wrong = good();
+    wrong.mesh.points.iter_mut().for_each(|p| *p *= 100.0);
+    says(&texts(&head::check(&wrong)), &["25.000 m high", "centimetres"]);
+    let shape = |name: &str, length: f32| BlendShape {
+        name: name.into(),
+        points: vec![1],
+        offsets: vec![Vec3::X * length],
+    };
+    let mut wrong = good();
+    wrong.shapes.extend([
+        BlendShape { name: "tongueOut".into(), ..BlendShape::default() },
+        shape("jawopen", 0.01),
+        shape("mouthSmilLeft", 0.01),
+        shape("jawLeft", 1e-7),
+        shape("jawRight", 3.0),
+    ]);
+    says(
+        &texts(&head::check(&wrong)),
+        &[
+            "shape \"tongueOut\": it moves no points",
+            "shape \"jawopen\": \"jawOpen\" is the same name",
+            "if it is \"mouthSmileLeft\", rename it",
+            "shape \"jawLeft\": it moves points by 0.0001 mm",
+            "shape \"jawRight\": it moves a point by 3.000 m",
+        ],
+    );
+}
+
+#[test]
+fn rigs_and_sequences_say_what_has_no_effect() {
+    let head = good();
+    let rig =
+        Rig::from_json("rig.json", &RIG.replace("\"chin\": -1", "\"chn\": 1").replace("0.1}", "0}")).unwrap();
+    says(
+        &texts(&performance::check_rig(&head, &rig)),
+        &["write \"chin\"", "expression \"calm\": it changes nothing"],
+    );
+    let rig = Rig::from_json("rig.json", RIG).unwrap();
+    let text = r#"{"fps": 4, "duration": 1, "expressions": {"joy": 0},
+        "shapes": {"jawOpen": [{"t": 0, "v": -0.5}, {"t": 2, "v": 1.5}]},
+        "head": {"yawDegrees": [{"t": 0, "v": 0}, {"t": 9, "v": 200}], "translation": [0, 30, 0]}}"#;
+    let sequence = Sequence::from_json("s.json", text).unwrap();
+    let (findings, evaluator) = performance::check_sequence(&head, &rig, &sequence);
+    assert!(evaluator.is_some());
+    says(
+        &texts(&findings),
+        &[
+            "2 keys leave 0 to 1",
+            "\"jawOpen\" has keys after the end",
+            "head.yawDegrees: there are keys after the end",
+            "expression \"joy\": its weight is 0 throughout",
+            "more than 90 degrees",
+        ],
+    );
+    let unknown = Sequence::from_json("s.json", &text.replace("\"joy\"", "\"jou\"")).unwrap();
+    let (findings, evaluator) = performance::check_sequence(&head, &rig, &unknown);
+    assert!(evaluator.is_none());
+    assert_eq!((findings[0].severity, findings[0].fix.as_deref()), (Severity::Error, Some("write \"joy\"")));
+}
+
+#[test]
+fn columns_that_move_nothing() {
+    let text = "Timecode,JawOpen,jawOpne,MouthClose\n0:0:0:0,0,0.5,0.25\n0:0:1:0,0.5,0.5,0.25\n0:0:2:0,1.5,0.5,0.25\n";
+    let recording = live_link::from_bytes(text.as_bytes(), "take.csv".as_ref(), None).unwrap();
+    let retarget = Retarget::from_json("r.json", r#"{"shapes": {"MouthClos": "mouthClose"}}"#).unwrap();
+    says(
+        &texts(&capture::check(&recording, &retarget, &good())),
+        &[
+            "column \"jawOpne\": no shape is known for this column",
+            "write \"jawOpne\": \"jawOpen\"",
+            "column \"MouthClos\": the retarget file names it",
+            "\"good\" has no shape for mouthClose",
+            "50 ARKit columns are missing",
+            "these columns never change: jawOpne, MouthClose",
+            "1 weights above the limit",
+        ],
+    );
+}

@@ -1,0 +1,117 @@
+//! Primitives with their morph targets.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use rayon::prelude::*;
+use rubor_rig::deform::{deform_points, point_normals, vertex_tangents};
+use rubor_rig::head::{BlendShape, Head, Material};
+use serde_json::{Value, json};
+
+use super::buffer::{Buffer, Target};
+use crate::export::skin_color::ShapeColors;
+use crate::facial_appearance::PartEntry;
+
+/// One primitive a part with vertices of its own (viewers keep morph targets per primitive, so sharing all vertices among
+/// parts would multiply them), and which points they are.
+pub(super) fn primitives(
+    head: &Head,
+    kept: &[usize],
+    morph_normals: bool,
+    colors: Option<&ShapeColors>,
+    buffer: &mut Buffer,
+) -> (Vec<Value>, Vec<PartEntry>) {
+    let mesh = &head.mesh;
+    let normals = point_normals(mesh, &mesh.points);
+    let tangents = vertex_tangents(mesh, &mesh.points, &normals);
+    let turned: Vec<Vec<(u32, Vec3)>> = (kept.par_iter().filter(|_| morph_normals))
+        .map(|s| normal_offsets(head, &head.shapes[*s], &normals))
+        .collect();
+    let mut primitives = Vec::new();
+    let mut entries = Vec::new();
+    for (material, part) in mesh.parts.iter().enumerate() {
+        let mut local: HashMap<u32, u32> = HashMap::new();
+        let mut vertices: Vec<u32> = Vec::new();
+        let triangles = &mesh.triangles[part.triangles.start as usize..part.triangles.end as usize];
+        let indices: Vec<u32> = triangles
+            .as_flattened()
+            .iter()
+            .map(|v| {
+                *local.entry(*v).or_insert_with(|| {
+                    vertices.push(*v);
+                    vertices.len() as u32 - 1
+                })
+            })
+            .collect();
+        let points: Vec<u32> = vertices.iter().map(|v| mesh.vertices[*v as usize].point).collect();
+        let at = |list: &[Vec3]| -> Vec<[f32; 3]> {
+            points.iter().map(|p| list[*p as usize].to_array()).collect()
+        };
+        let uvs: Vec<[f32; 2]> = vertices.iter().map(|v| mesh.vertices[*v as usize].uv.to_array()).collect();
+        let tangents: Vec<[f32; 4]> = vertices.iter().map(|v| tangents[*v as usize].to_array()).collect();
+        let mut vertices_of: HashMap<u32, Vec<u32>> = HashMap::new();
+        points.iter().enumerate().for_each(|(v, p)| vertices_of.entry(*p).or_default().push(v as u32));
+        let to_vertices = |moved: &mut dyn Iterator<Item = (u32, Vec3)>| {
+            let mut moved: Vec<(u32, Vec3)> = moved
+                .flat_map(|(p, d)| vertices_of.get(&p).into_iter().flatten().map(move |v| (*v, d)))
+                .collect();
+            moved.sort_unstable_by_key(|(v, _)| *v);
+            moved
+        };
+        let mut primitive = json!({
+            "attributes": {
+                "POSITION": buffer.floats(&at(&mesh.points), Target::Vertices, true),
+                "NORMAL": buffer.floats(&at(&normals), Target::Vertices, false),
+                "TANGENT": buffer.floats(&tangents, Target::Vertices, false),
+                "TEXCOORD_0": buffer.floats(&uvs, Target::Vertices, false),
+            },
+            "indices": buffer.indices(&indices, vertices.len(), Target::Indices),
+            "material": material,
+        });
+        let colors = colors.filter(|_| part.material == Material::Skin);
+        if let Some(colors) = colors {
+            let rest = vec![[colors.rest; 3]; vertices.len()];
+            primitive["attributes"]["COLOR_0"] = json!(buffer.floats(&rest, Target::Vertices, false));
+        }
+        // Every target must be there on every primitive; those that do not move it share one empty accessor.
+        let mut still = None;
+        let mut targets = Vec::new();
+        for (i, s) in kept.iter().enumerate() {
+            let shape = &head.shapes[*s];
+            let offsets = to_vertices(&mut shape.points.iter().copied().zip(shape.offsets.iter().copied()));
+            let mut put = |moved: &[(u32, Vec3)]| match buffer.displacements(vertices.len(), moved) {
+                Some(accessor) => accessor,
+                None => *still.get_or_insert_with(|| buffer.zeros(vertices.len())),
+            };
+            let mut target = json!({"POSITION": put(&offsets)});
+            if let Some(turned) = turned.get(i) {
+                target["NORMAL"] = json!(put(&to_vertices(&mut turned.iter().copied())));
+            }
+            if let Some(colors) = colors {
+                let changed = colors.changes[*s].iter();
+                let mut changed: Vec<(u32, Vec3)> =
+                    changed.filter_map(|(v, c)| Some((*local.get(v)?, *c))).collect();
+                changed.sort_unstable_by_key(|(v, _)| *v);
+                target["COLOR_0"] = json!(put(&changed));
+            }
+            targets.push(target);
+        }
+        if !targets.is_empty() {
+            primitive["targets"] = json!(targets);
+        }
+        primitives.push(primitive);
+        let points = buffer.indices(&points, mesh.points.len(), Target::None) as u32;
+        entries.push(PartEntry { name: part.name.clone(), material: part.material, points });
+    }
+    (primitives, entries)
+}
+
+/// Change of each normal at weight 1, where it exceeds about a sixteenth of a degree.
+fn normal_offsets(head: &Head, shape: &BlendShape, rest: &[Vec3]) -> Vec<(u32, Vec3)> {
+    let points = deform_points(&head.mesh, std::slice::from_ref(shape), &[1.0]);
+    let turned = point_normals(&head.mesh, &points);
+    (turned.iter().zip(rest).enumerate())
+        .map(|(i, (n, n0))| (i as u32, *n - *n0))
+        .filter(|(_, d)| d.length() > 1e-3)
+        .collect()
+}

@@ -1,0 +1,173 @@
+//! What a glTF document says that no reader will do.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use glam::{Vec3, Vec4};
+use gltf::Semantic;
+
+use super::accessor::floats;
+use super::document::Document;
+use super::foreign::target_names;
+use crate::check::{Finding, list};
+use crate::error::ImportError;
+use crate::facial_appearance::NAME;
+
+/// Lengths of normals and sums of joint weights may be off by this: bytes and shorts round.
+const ROUNDING: f32 = 0.01;
+
+/// Names of targets, bounds, normals, tangents, weights of joints, animations.
+///
+/// # Errors
+/// A document or an accessor that cannot be read at all.
+pub fn lint(bytes: &[u8], path: &Path) -> Result<Vec<Finding>, ImportError> {
+    let document = Document::load(bytes, path)?;
+    let mut findings = Vec::new();
+    if document.gltf.extension_value(NAME).is_none() {
+        let message = format!("there is no {NAME}: maps, rig and landmarks are not in this file");
+        findings.push(Finding::note("", message).fix("`rubor import` adds them"));
+    }
+    for mesh in document.gltf.meshes() {
+        names(&mesh, &mut findings);
+        for primitive in mesh.primitives() {
+            let at = format!("mesh {}, primitive {}", mesh.index(), primitive.index());
+            attributes(&document, &at, &primitive, &mut findings)?;
+        }
+    }
+    animations(&document, &mut findings)?;
+    if document.gltf.skins().len() > 0 {
+        let message = "joints are read in their rest pose: their animation moves nothing here";
+        findings.push(Finding::note("skins", message).fix("bake jaw and eye joints into morph targets"));
+    }
+    Ok(findings)
+}
+
+fn names(mesh: &gltf::Mesh<'_>, findings: &mut Vec<Finding>) {
+    let at = format!("mesh {}", mesh.index());
+    let count = mesh.primitives().map(|p| p.morph_targets().count()).max().unwrap_or(0);
+    if count == 0 {
+        return;
+    }
+    if mesh.primitives().any(|p| p.morph_targets().count() != count) {
+        let message = "its primitives have different numbers of morph targets";
+        findings.push(Finding::error(at.clone(), message).fix("export all parts with the same targets"));
+    }
+    let names = target_names(mesh);
+    let unnamed: Vec<&String> = names.iter().filter(|n| n.starts_with("target ")).collect();
+    if !unnamed.is_empty() {
+        let message = format!(
+            "{} of {count} morph targets have no name: nothing can drive them by name",
+            unnamed.len()
+        );
+        findings.push(Finding::warning(at.clone(), message).fix("write them to mesh.extras.targetNames"));
+    }
+    let mut seen = HashSet::new();
+    let twice: Vec<&String> = names.iter().filter(|n| !seen.insert(*n)).collect();
+    if !twice.is_empty() {
+        findings.push(
+            Finding::warning(at, format!("morph targets share a name: {}", list(&twice))).fix("rename them"),
+        );
+    }
+}
+
+fn attributes(
+    document: &Document,
+    at: &str,
+    primitive: &gltf::Primitive<'_>,
+    findings: &mut Vec<Finding>,
+) -> Result<(), ImportError> {
+    if let Some(accessor) = primitive.get(&Semantic::Positions) {
+        let positions = floats::<3>(document, at, &accessor)?;
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for p in &positions {
+            low = low.min(Vec3::from_array(*p));
+            high = high.max(Vec3::from_array(*p));
+        }
+        let stated = |value: Option<serde_json::Value>| -> Option<Vec3> {
+            let list = value?;
+            let at = |i: usize| Some(list.get(i)?.as_f64()? as f32);
+            Some(Vec3::new(at(0)?, at(1)?, at(2)?))
+        };
+        // Integer positions state integers.
+        let is_float = accessor.data_type() == gltf::accessor::DataType::F32;
+        let slack = 1e-5 * (high - low).max_element().max(f32::MIN_POSITIVE);
+        if let (Some(min), Some(max), true) = (stated(accessor.min()), stated(accessor.max()), is_float)
+            && !(min.abs_diff_eq(low, slack) && max.abs_diff_eq(high, slack))
+        {
+            let message = format!(
+                "POSITION states {min} to {max}, its values are {low} to {high}: viewers frame and cull it wrongly"
+            );
+            findings.push(Finding::warning(at, message).fix("write min and max from the values"));
+        }
+    }
+    if let Some(accessor) = primitive.get(&Semantic::Normals) {
+        let normals = floats::<3>(document, at, &accessor)?;
+        let off = normals.iter().filter(|n| (Vec3::from_array(**n).length() - 1.0).abs() > ROUNDING).count();
+        if off > 0 {
+            let message = format!("{off} normals are not of length 1");
+            findings.push(Finding::warning(at, message).fix("normalise them; rubor makes its own"));
+        }
+    }
+    if let Some(accessor) = primitive.get(&Semantic::Tangents) {
+        let tangents = floats::<4>(document, at, &accessor)?;
+        let off = tangents.iter().filter(|t| t[3].abs() != 1.0).count();
+        if off > 0 {
+            let message = format!("{off} tangents have a fourth number that is neither 1 nor -1");
+            findings.push(Finding::warning(at, message).fix("write the sign of the bitangent there"));
+        }
+    }
+    if let Some(accessor) = primitive.get(&Semantic::Weights(0)) {
+        let weights = floats::<4>(document, at, &accessor)?;
+        let second = match primitive.get(&Semantic::Weights(1)) {
+            Some(accessor) => floats::<4>(document, at, &accessor)?,
+            None => vec![[0.0; 4]; weights.len()],
+        };
+        let sum = |w: &[f32; 4]| Vec4::from_array(*w).element_sum();
+        let off =
+            weights.iter().zip(&second).filter(|(a, b)| (sum(a) + sum(b) - 1.0).abs() > ROUNDING).count();
+        if off > 0 {
+            let message = format!("weights of joints do not sum to one at {off} vertices");
+            findings.push(Finding::warning(at, message).fix("normalise the skin weights before export"));
+        }
+    }
+    Ok(())
+}
+
+fn animations(document: &Document, findings: &mut Vec<Finding>) -> Result<(), ImportError> {
+    for animation in document.gltf.animations() {
+        for (i, channel) in animation.channels().enumerate() {
+            let at = format!("animation {}, channel {i}", animation.index());
+            let times = floats::<1>(document, &at, &channel.sampler().input())?;
+            if times.windows(2).any(|w| w[0][0] >= w[1][0]) {
+                findings.push(
+                    Finding::error(at.clone(), "times of keys do not rise").fix("sort the keys, one a time"),
+                );
+            }
+            if channel.target().property() != gltf::animation::Property::MorphTargetWeights {
+                continue;
+            }
+            let count = channel.target().node().mesh().map_or(0, |m| target_names(&m).len());
+            let values = floats::<1>(document, &at, &channel.sampler().output())?;
+            let cubic = channel.sampler().interpolation() == gltf::animation::Interpolation::CubicSpline;
+            let expected = times.len() * count * if cubic { 3 } else { 1 };
+            if values.len() != expected {
+                let message = format!(
+                    "there are {} weights, {} keys of {count} targets need {expected}",
+                    values.len(),
+                    times.len()
+                );
+                findings.push(Finding::error(at, message).fix("export the animation again"));
+                continue;
+            }
+            let outside = (values.iter().enumerate())
+                .filter(|(i, _)| !cubic || (i / count.max(1)) % 3 == 1)
+                .filter(|(_, v)| !(-0.001..=1.001).contains(&v[0]))
+                .count();
+            if outside > 0 {
+                let message = format!("{outside} weights leave 0 to 1: sequences cut them there");
+                findings.push(Finding::warning(at, message));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,97 @@
+//! Milliseconds of the appearance pass by the number of distributions and of wrinkle zones:
+//! `cargo run --release -p rubor-renderer --example appearance_cost [ADAPTER]`.
+
+use std::sync::Arc;
+
+use glam::{Mat4, Vec2, Vec3};
+use rubor_renderer::{
+    AppearanceMethods, Camera, ColorTable, Gpu, HeadInstance, HeadOnGpu, RenderError, Renderer,
+    ScatterMethod, Scene, Settings, TransmitMethod, antialias,
+};
+use rubor_rig::face_state::FaceState;
+use rubor_rig::head::{Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
+use rubor_rig::map::Map;
+use rubor_rig::skin::profile::Profile;
+
+const FRAMES: usize = 21;
+
+fn main() -> Result<(), RenderError> {
+    let gpu = Gpu::new(std::env::args().nth(1).as_deref())?;
+    println!("{}, {}", gpu.info.name, gpu.info.driver_info);
+    let mut renderer = Renderer::new(gpu)?;
+    let none = cost(&mut renderer, 0, 0)?;
+    println!("nothing: {none:.4} ms");
+    for n in [1, 2, 4, 8, 16, 32, 64] {
+        let ms = cost(&mut renderer, n, 0)?;
+        println!("{n:2} distributions: {ms:.4} ms, {:.4} each", (ms - none) / n as f64);
+    }
+    for n in [4, 12, 64] {
+        let ms = cost(&mut renderer, 0, n)?;
+        println!("{n:2} zones: {ms:.4} ms, {:.4} each", (ms - none) / n as f64);
+    }
+    Ok(())
+}
+
+/// Median of the pass over frames in which all distributions and zones have weights.
+fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<f64, RenderError> {
+    let head = head(distributions, zones);
+    let table = ColorTable { width: 2, height: 2, texels: &[[0.5; 3]; 4] };
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &table)?;
+    let mut state = FaceState::neutral(&head);
+    state.distributions.fill(1.0 / distributions.max(1) as f32);
+    state.zones.fill(0.5);
+    let heads = [HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }];
+    let scene = Scene {
+        heads: &heads,
+        camera: Camera { position: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 },
+        lights: &[],
+        environment: None,
+        environment_intensity: 0.0,
+        background_linear: Vec3::ZERO,
+    };
+    let settings = Settings {
+        size: [16, 16],
+        scatter: ScatterMethod::None,
+        transmit: TransmitMethod::None,
+        appearance: AppearanceMethods::default(),
+        profile: Arc::new(Profile::deon_six()),
+        antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
+        supersampling: 1,
+        shadow_size: 16,
+        exposure: 1.0,
+    };
+    let mut times = Vec::new();
+    for _ in 0..FRAMES {
+        let (_, stats) = renderer.render(&scene, &settings)?;
+        times.extend(stats.passes_ms.iter().filter(|(name, _)| *name == "appearance").map(|(_, ms)| *ms));
+    }
+    times.sort_by(f64::total_cmp);
+    Ok(times.get(times.len() / 2).copied().unwrap_or(f64::NAN))
+}
+
+/// A square of skin with maps.
+fn head(distributions: usize, zones: usize) -> Head {
+    let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+    let mesh = Mesh {
+        points: corners.iter().map(|c| (0.2 * (*c - 0.5)).extend(0.0)).collect(),
+        vertices: corners.iter().enumerate().map(|(i, uv)| Vertex { point: i as u32, uv: *uv }).collect(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        parts: vec![Part { name: "skin".into(), material: Material::Skin, triangles: 0..2 }],
+        ..Mesh::default()
+    };
+    let flat = |v| Map::filled(256, 256, &[v]);
+    let maps = SkinMaps {
+        melanin: Some(flat(0.03)),
+        hemoglobin: Some(flat(0.02)),
+        hemoglobin_mean: Some(flat(0.02)),
+        distributions: (0..distributions)
+            .map(|i| Distribution { name: i.to_string(), scale: flat(1.2), bias: flat(0.03) })
+            .collect(),
+        wrinkle_slopes: vec![Map::filled(256, 256, &[0.1, 0.0])],
+        zones: (0..zones)
+            .map(|i| WrinkleZone { name: i.to_string(), wrinkle_map: 0, mask: Map::filled(128, 128, &[0.5]) })
+            .collect(),
+        ..SkinMaps::default()
+    };
+    Head { name: "square".into(), mesh, maps, ..Head::default() }
+}
