@@ -14,6 +14,7 @@ use crate::pass_timer::{FrameLog, FrameTimes, PassTimer};
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::{Appearance, AppearanceMethods, Blended, ColorMethod};
 use crate::passes::compose::Compose;
+use crate::passes::cropped_hair::CroppedHair;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
 use crate::passes::overlay::{Overlaid, Overlay};
@@ -109,6 +110,7 @@ pub struct Renderer {
     shade: Shade,
     scatter: Scatter,
     compose: Compose,
+    cropped_hair: CroppedHair,
     overlay: Overlay,
     display: Display,
     velocity: Velocity,
@@ -161,6 +163,7 @@ impl Renderer {
             shade: Shade::new(&gpu),
             scatter: Scatter::default(),
             compose: Compose::new(&gpu),
+            cropped_hair: CroppedHair::new(&gpu),
             overlay: Overlay::new(&gpu),
             display: Display::new(&gpu),
             velocity: Velocity::new(&gpu),
@@ -422,7 +425,7 @@ impl Renderer {
             }
             let numbers = [&head.state.shapes, &head.state.zones, &head.state.distributions];
             if numbers.iter().any(|n| n.iter().any(|w| !w.is_finite()))
-                || !head.state.hemoglobin_scale.is_finite()
+                || !(head.state.hemoglobin_scale + head.state.pupil_mm).is_finite()
             {
                 return limit("face state", "a weight that is not finite".into(), "finite weights".into());
             }
@@ -573,6 +576,16 @@ impl Renderer {
 
             let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
             self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
+            let ambient = average_light(scene);
+            let haired: Vec<_> = heads
+                .iter()
+                .filter(|(h, _)| h.hair_root_count > 0)
+                .map(|(h, i)| (*h, &i.positions, &i.frames))
+                .collect();
+            if !haired.is_empty() {
+                let images = [&targets.irradiance, &sample.depth, &targets.hdr];
+                self.cropped_hair.record(gpu, encoder, timer, &view, ambient, &haired, images);
+            }
             // The first frame has nothing before it: its positions stand for the previous ones.
             let known = self.past.clip_from_world.is_some();
             let previous =
@@ -603,7 +616,6 @@ impl Renderer {
                 })
                 .collect();
             if !overlays.is_empty() {
-                let ambient = average_light(scene);
                 let images = [&sample.depth, &targets.hdr];
                 self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images, velocity);
             }
@@ -743,6 +755,7 @@ fn shaded<'a>(
             ColorMethod::Hemoglobin => instance.state.hemoglobin_scale,
         },
         wrinkles: appearance.wrinkles,
+        pupil_mm: instance.state.pupil_mm,
     }
 }
 

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use glam::{Mat4, Quat, Vec3};
 use rubor_renderer::antialias::{Mode, Preset, reference::linear_from_srgb};
 use rubor_renderer::{
-    Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, Renderer,
-    ScatterMethod, Scene, Settings, TransmitMethod, antialias,
+    AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light,
+    LightKind, Renderer, ScatterMethod, Scene, Settings, TransmitMethod, antialias,
 };
 use rubor_rig::face_state::FaceState;
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
@@ -33,6 +33,7 @@ fn settings(mode: Mode, supersampling: u32) -> Settings {
         transmit: TransmitMethod::None,
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(mode, Preset::High),
+        appearance: AppearanceMethods::default(),
         supersampling,
         shadow_size: 512,
         exposure: 1.8,

@@ -50,6 +50,9 @@ struct Fragment {
 // Width of a hair that is geometry, at its root, metres (u >= 2: rubor-assets' strands).
 const STRAND_WIDTH = 0.00013;
 
+// Lashes are the stoutest hairs of the face, and each stands for two or three that cling together.
+const LASH_STOUTNESS = 1.7;
+
 @vertex
 fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
     let triangle = triangles[params.first + corner / 3u];
@@ -63,7 +66,7 @@ fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
     if (triangle.w == LASH || triangle.w == HAIR) && vertex.u >= 2.0 {
         // A hair faces the viewer and is drawn no thinner than a pixel; it fades instead.
         let side = vertex.u - 2.0 * floor(0.5 * vertex.u) - 0.5;
-        let width = STRAND_WIDTH * (1.0 - vertex.v * vertex.v);
+        let width = STRAND_WIDTH * select(1.0, LASH_STOUTNESS, triangle.w == LASH) * (1.0 - vertex.v * vertex.v);
         let center = position - side * width * frame.tangent;
         let along = cross(frame.normal, frame.tangent);
         clip = view.clip_from_world * vec4f(center, 1.0);
