@@ -25,6 +25,9 @@ const SAMPLES: [u32; 2] = [8, 4];
 /// Contrast of luma that makes a pixel count as one at an edge: the threshold of the preset.
 const EDGE: f32 = 0.1;
 
+/// Pictures, and the motion of each of their pixels.
+type Film = (Vec<Image>, Vec<Vec<[f32; 2]>>);
+
 fn settings(mode: Mode, supersampling: u32) -> Settings {
     Settings {
         size: [SIDE; 2],
@@ -224,7 +227,7 @@ fn in_motion(stage: &mut Stage, folder: Option<PathBuf>) -> Result<()> {
     let middle = 0.5 * (low + high);
     let camera = camera(middle + Vec3::new(0.0, 0.0, 0.9), middle);
     // T2x first: it knows the velocities. Then the truth, which all are compared with.
-    let mut sequence = |mode: Mode, samples: u32| -> Result<(Vec<Image>, Vec<Vec<[f32; 2]>>)> {
+    let mut sequence = |mode: Mode, samples: u32| -> Result<Film> {
         stage.renderer.cut(0);
         let (mut images, mut velocities) = (Vec::new(), Vec::new());
         for frame in 0..frames {
