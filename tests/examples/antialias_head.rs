@@ -9,8 +9,8 @@ use std::sync::Arc;
 use glam::{Mat4, Quat, Vec3};
 use rubor_renderer::antialias::{Mode, Preset, reference::linear_from_srgb};
 use rubor_renderer::{
-    Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, Renderer,
-    ScatterMethod, Scene, Settings, TransmitMethod, antialias,
+    AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light,
+    LightKind, Renderer, ScatterMethod, Scene, Settings, TransmitMethod, antialias,
 };
 use rubor_rig::face_state::FaceState;
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
@@ -31,6 +31,7 @@ fn settings(mode: Mode, supersampling: u32) -> Settings {
         // What scatters has no edges.
         scatter: ScatterMethod::None,
         transmit: TransmitMethod::None,
+        appearance: AppearanceMethods::default(),
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(mode, Preset::High),
         supersampling,
