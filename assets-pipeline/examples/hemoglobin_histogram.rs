@@ -27,7 +27,8 @@ fn place(head: &Head, landmark: &str) -> Option<[f32; 2]> {
     let at = *head.landmarks.get(landmark)?;
     let mesh = &head.mesh;
     let part = mesh.parts.iter().find(|p| p.material == Material::Skin)?;
-    let vertices = mesh.triangles[part.triangles.start as usize..part.triangles.end as usize].iter().flatten();
+    let vertices =
+        mesh.triangles[part.triangles.start as usize..part.triangles.end as usize].iter().flatten();
     let distance = |v: &u32| mesh.points[mesh.vertices[*v as usize].point as usize].distance_squared(at);
     let nearest = vertices.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     Some(mesh.vertices[*nearest as usize].uv.to_array())
@@ -46,7 +47,8 @@ fn standardised(map: &Map, [u, v]: [f32; 2]) -> Vec<f64> {
             window.values[(y * whole + x) as usize] = map.texel(x0 + x, y0 + y)[0];
         }
     }
-    let statistics = local_statistics(&window, &Mask::full(whole, whole), radius).expect("a window of finite values");
+    let statistics =
+        local_statistics(&window, &Mask::full(whole, whole), radius).expect("a window of finite values");
     let inner = radius..whole - radius;
     let texels = inner.clone().flat_map(|y| inner.clone().map(move |x| (y * whole + x) as usize));
     texels
@@ -61,7 +63,10 @@ fn main() {
     let map = head.maps.hemoglobin.as_ref().expect("a head with a map of hemoglobin");
     let (width, height) = (200.0, 130.0);
     let total = width * PLACES.len() as f64;
-    println!(r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {total} {:.0}" font-family="sans-serif" font-size="9">"#, height + 34.0);
+    println!(
+        r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {total} {:.0}" font-family="sans-serif" font-size="9">"#,
+        height + 34.0
+    );
     println!(r##"<rect width="100%" height="100%" fill="#fff"/>"##);
     for (i, (landmark, name)) in PLACES.iter().enumerate() {
         let Some(uv) = place(&head, landmark) else { continue };
@@ -100,7 +105,10 @@ fn main() {
             })
             .collect();
         println!(r##"<polyline points="{}" fill="none" stroke="#222" stroke-width="1"/>"##, curve.join(" "));
-        println!(r##"<line x1="{left}" x2="{:.1}" y1="{height}" y2="{height}" stroke="#222"/>"##, left + width - 28.0);
+        println!(
+            r##"<line x1="{left}" x2="{:.1}" y1="{height}" y2="{height}" stroke="#222"/>"##,
+            left + width - 28.0
+        );
         for sigma in [-2.0, 0.0, 2.0] {
             let x = left + across * (sigma + REACH);
             println!(r##"<text x="{x:.1}" y="{:.1}" text-anchor="middle">{sigma} σ</text>"##, height + 11.0);

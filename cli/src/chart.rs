@@ -8,10 +8,12 @@
 use std::path::PathBuf;
 
 use rubor_assets::compare::{Pixels, flip, mean_and_percentile, relative_rmse};
+use rubor_assets::image_io::{SampleKind, save_image};
 use rubor_renderer::antialias::Mode;
-use rubor_renderer::{Gpu, Image, Renderer, ScatterMethod, TransmitMethod};
+use rubor_renderer::{BARE_SKIN, Gpu, Image, Renderer, ScatterMethod, TransmitMethod};
 use rubor_rig::color::srgb_decode;
 use rubor_rig::evaluate::Evaluator;
+use rubor_rig::map::Map;
 use serde::Serialize;
 
 use crate::antialias_method::Antialias;
@@ -50,7 +52,7 @@ pub(crate) struct Arguments {
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Folder for pictures of each method and its visible differences from reference-surface
+    /// Folder for pictures of each method, its visible differences from reference-surface, and its diffuse light (EXR)
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Print JSON
@@ -107,11 +109,11 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     };
     let screen = draw(ScatterMethod::ReferenceScreen, arguments.transmit, 0)?;
     let surface = draw(ScatterMethod::ReferenceSurface(arguments.batches), TransmitMethod::None, 0)?;
-    let is_skin: Vec<bool> = surface.diffuse.iter().map(|p| p[3] > 0.0).collect();
+    let is_skin: Vec<bool> = surface.diffuse.iter().map(|p| p[3] >= BARE_SKIN).collect();
     if let Some(folder) = &arguments.output {
         output::folder(folder)?;
         output::save_image(&folder.join("reference-surface.png"), &surface.image)?;
-        output::save_image(&folder.join("reference-screen.png"), &screen.image)?;
+        save_light(folder.join("reference-surface.exr"), &surface)?;
     }
     let mut rows = Vec::new();
     let references = [("reference-screen".to_owned(), Some(screen))];
@@ -132,6 +134,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         if let Some(folder) = &arguments.output {
             let file = name.replace(':', "-");
             output::save_image(&folder.join(format!("{file}.png")), &drawn.image)?;
+            save_light(folder.join(format!("{file}.exr")), &drawn)?;
             let picture = difference_picture(&map, drawn.image.width, drawn.image.height);
             let path = folder.join(format!("{file}-difference.png"));
             output::commit(&path, |partial| picture.save(partial).map_err(std::io::Error::other))?;
@@ -174,4 +177,15 @@ fn pixels(image: &Image) -> Pixels {
         height: image.height as usize,
         linear: image.rgba.chunks_exact(4).map(decode).collect(),
     }
+}
+
+/// Diffuse light of bare skin, black elsewhere.
+fn save_light(path: PathBuf, drawn: &Drawn) -> Outcome {
+    let values = drawn
+        .diffuse
+        .iter()
+        .flat_map(|p| if p[3] >= BARE_SKIN { [p[0], p[1], p[2]] } else { [0.0; 3] })
+        .collect();
+    let map = Map { width: drawn.image.width, height: drawn.image.height, channels: 3, values };
+    save_image(&path, &map, SampleKind::F32).map_err(Failure::job)
 }

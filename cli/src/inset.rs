@@ -21,8 +21,8 @@ const SIDE: u32 = 256;
 const SHARE: f32 = 0.3;
 /// Pixels between the inset and the border of the frame.
 const MARGIN: u32 = 4;
-/// Flushed cheeks have half again the blood of the redder parts of a calm face.
-const BLACK: f32 = 1.6;
+/// Flushed cheeks have two to three times the blood of the redder parts of a calm face.
+const BLACK: f32 = 2.8;
 /// Landmarks at the border of a face.
 const FACE: [&str; 6] = ["trichion", "menton", "gonion-left", "gonion-right", "zygion-left", "zygion-right"];
 /// Grey around the skin.

@@ -35,6 +35,7 @@ mod schema;
 mod sequence_job;
 mod studio;
 mod video;
+mod walks;
 
 /// Faces whose skin changes colour and wrinkles as they act.
 ///

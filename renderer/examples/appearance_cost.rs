@@ -1,5 +1,8 @@
 //! Milliseconds of the appearance pass by the number of distributions and of wrinkle zones:
 //! `cargo run --release -p rubor-renderer --example appearance_cost [ADAPTER]`.
+//!
+//! Prints what the device's timestamps say of the pass and the wall clock of a whole frame of 16 x 16 pixels: a software
+//! device stamps when it takes work in, not when it does it.
 
 use std::sync::Arc;
 
@@ -20,20 +23,25 @@ fn main() -> Result<(), RenderError> {
     println!("{}, {}", gpu.info.name, gpu.info.driver_info);
     let mut renderer = Renderer::new(gpu)?;
     let none = cost(&mut renderer, 0, 0)?;
-    println!("nothing: {none:.4} ms");
+    println!("nothing: pass {:.4} ms, frame {:.3} ms", none[0], none[1]);
+    let line = |what: &str, n: usize, ms: [f64; 2]| {
+        let each = [0, 1].map(|i| (ms[i] - none[i]) / n as f64);
+        println!(
+            "{n:2} {what}: pass {:.4} ms, frame {:.3} ms; each {:.4} and {:.4}",
+            ms[0], ms[1], each[0], each[1]
+        );
+    };
     for n in [1, 2, 4, 8, 16, 32, 64] {
-        let ms = cost(&mut renderer, n, 0)?;
-        println!("{n:2} distributions: {ms:.4} ms, {:.4} each", (ms - none) / n as f64);
+        line("distributions", n, cost(&mut renderer, n, 0)?);
     }
     for n in [4, 12, 64] {
-        let ms = cost(&mut renderer, 0, n)?;
-        println!("{n:2} zones: {ms:.4} ms, {:.4} each", (ms - none) / n as f64);
+        line("zones", n, cost(&mut renderer, 0, n)?);
     }
     Ok(())
 }
 
-/// Median of the pass over frames in which all distributions and zones have weights.
-fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<f64, RenderError> {
+/// Medians of the pass and of the frame over frames in which all distributions and zones have weights.
+fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<[f64; 2], RenderError> {
     let head = head(distributions, zones);
     let table = ColorTable { width: 2, height: 2, texels: &[[0.5; 3]; 4] };
     let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &table)?;
@@ -60,13 +68,18 @@ fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<f
         shadow_size: 16,
         exposure: 1.0,
     };
-    let mut times = Vec::new();
+    let (mut times, mut frames) = (Vec::new(), Vec::new());
     for _ in 0..FRAMES {
+        let start = std::time::Instant::now();
         let (_, stats) = renderer.render(&scene, &settings)?;
+        frames.push(1e3 * start.elapsed().as_secs_f64());
         times.extend(stats.passes_ms.iter().filter(|(name, _)| *name == "appearance").map(|(_, ms)| *ms));
     }
-    times.sort_by(f64::total_cmp);
-    Ok(times.get(times.len() / 2).copied().unwrap_or(f64::NAN))
+    let median = |mut list: Vec<f64>| {
+        list.sort_by(f64::total_cmp);
+        list.get(list.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    Ok([median(times), median(frames)])
 }
 
 /// A square of skin with maps.

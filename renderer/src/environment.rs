@@ -104,7 +104,8 @@ impl EnvironmentMap {
     pub fn sky() -> Self {
         const SUN_RADIUS: f32 = 5.0 * PI / 180.0;
         let (elevation, azimuth) = (38.0f32.to_radians(), -40.0f32.to_radians());
-        let sun = Vec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
+        let sun =
+            Vec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
         Self::from_fn(256, 128, move |d| {
             let angle = d.dot(sun).clamp(-1.0, 1.0).acos();
             let disc = 1.0 - ((angle - SUN_RADIUS) / 0.03).clamp(0.0, 1.0);

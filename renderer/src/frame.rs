@@ -6,6 +6,7 @@ use glam::{Mat4, Vec3};
 use rubor_rig::skin::profile::Profile;
 use serde::Serialize;
 
+use crate::clusters::{self, Sphere, Viewer};
 use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::head::{GpuVertex, HeadOnGpu};
@@ -13,10 +14,10 @@ use crate::pass_timer::{FrameLog, FrameTimes, PassTimer};
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::{Appearance, AppearanceMethods, Blended, ColorMethod};
 use crate::passes::compose::Compose;
+use crate::passes::cropped_hair::CroppedHair;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
-use crate::passes::cropped_hair::CroppedHair;
-use crate::passes::overlay::Overlay;
+use crate::passes::overlay::{Overlaid, Overlay};
 use crate::passes::scatter::surface::{self, Skin, Surface};
 use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
 use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded, TransmitMethod, Transmittance};
@@ -267,7 +268,8 @@ impl Renderer {
     /// Checks a scene and makes what its frames need.
     fn prepare(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
         self.check(scene, settings)?;
-        let shadow_layers = scene.lights.iter().filter(|l| l.casts_shadow).count() as u32;
+        let lamps = lamps(scene, settings);
+        let shadow_layers = lamps.iter().filter(|l| l.casts_shadow).count() as u32;
         if !self.targets.as_ref().is_some_and(|t| t.matches(settings, shadow_layers)) {
             self.targets = Some(Targets::new(&self.gpu, settings, shadow_layers));
             self.antialias = None;
@@ -314,6 +316,20 @@ impl Renderer {
         let bytes = self.gpu.read_texture(targets.hdr.texture())?;
         let halves: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
         Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
+    }
+
+    /// Motion of each pixel since the previous frame in pixels, x right, y down; rows from the top. Empty unless the
+    /// last frame kept a history.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_velocity(&self) -> Result<Vec<[f32; 2]>, RenderError> {
+        let Some(velocity) = self.targets.as_ref().and_then(|t| t.velocity.as_ref()) else {
+            return Ok(Vec::new());
+        };
+        let bytes = self.gpu.read_texture(velocity.texture())?;
+        let halves: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(halves.into_iter().map(|t| [t[0].to_f32(), t[1].to_f32()]).collect())
     }
 
     /// Normal and tangent (w = sign of the bitangent) of each vertex of the first head of the last frame, world space.
@@ -477,7 +493,8 @@ impl Renderer {
             }
         }
 
-        let (lights, layers) = place_lights(scene, &targets.shadows);
+        let lamps = &lamps(scene, settings);
+        let (lights, layers) = place_lights(scene, lamps, &targets.shadows, &receivers(scene, settings));
         for (light, layer) in &layers {
             self.shadow.record(gpu, encoder, timer, light, &drawn, layer);
         }
@@ -492,7 +509,8 @@ impl Renderer {
             let first = &targets.samples[0];
             // A camera reaches a place in the pixel by moving the image the other way.
             let jitter = subsample.position_px.map(|p| -p);
-            let view = view(scene, targets.size, [jitter, shading_jitter], self.past.clip_from_world);
+            let jitters = [jitter, shading_jitter];
+            let view = view(scene, lamps, targets.size, jitters, self.past.clip_from_world);
             let view = gpu.uniform("view", &view);
             self.visibility.record(gpu, encoder, timer, &view, &drawn, &sample.ids, &sample.depth);
 
@@ -568,31 +586,42 @@ impl Renderer {
                 let images = [&targets.irradiance, &sample.depth, &targets.hdr];
                 self.cropped_hair.record(gpu, encoder, timer, &view, ambient, &haired, images);
             }
-            let overlays: Vec<_> = heads
-                .iter()
-                .filter(|(h, _)| h.overlay_triangles > 0)
-                .map(|(h, i)| (*h, &i.positions, &i.frames))
-                .collect();
-            if !overlays.is_empty() {
-                let images = [&sample.depth, &targets.hdr];
-                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
-            }
-
-            let (exposure, samples) = (settings.exposure, settings.supersampling);
-            self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
-            if let Some(velocity) = targets.velocity.as_ref().filter(|_| std::ptr::eq(sample, first)) {
-                // The first frame has nothing before it: its positions stand for the previous ones.
-                let known = self.past.clip_from_world.is_some();
+            // The first frame has nothing before it: its positions stand for the previous ones.
+            let known = self.past.clip_from_world.is_some();
+            let previous =
+                |i: &'_ Instance| if known { i.previous_positions.clone() } else { i.positions.clone() };
+            let previous_positions: Vec<wgpu::Buffer> = heads.iter().map(|(_, i)| previous(i)).collect();
+            let velocity = targets.velocity.as_ref().filter(|_| std::ptr::eq(sample, first));
+            if let Some(velocity) = velocity {
                 let moving: Vec<_> = heads
                     .iter()
-                    .map(|(head, i)| Moving {
+                    .zip(&previous_positions)
+                    .map(|((head, i), previous_positions)| Moving {
                         head,
                         positions: &i.positions,
-                        previous_positions: if known { &i.previous_positions } else { &i.positions },
+                        previous_positions,
                     })
                     .collect();
                 self.velocity.record(gpu, encoder, timer, &view, &moving, &sample.ids, velocity);
             }
+            let overlays: Vec<_> = heads
+                .iter()
+                .zip(&previous_positions)
+                .filter(|((head, _), _)| head.overlay_triangles > 0)
+                .map(|((head, i), previous_positions)| Overlaid {
+                    head,
+                    positions: &i.positions,
+                    previous_positions,
+                    frames: &i.frames,
+                })
+                .collect();
+            if !overlays.is_empty() {
+                let images = [&sample.depth, &targets.hdr];
+                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images, velocity);
+            }
+
+            let (exposure, samples) = (settings.exposure, settings.supersampling);
+            self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
         }
 
         if let Some(antialias) = &self.antialias {
@@ -629,6 +658,7 @@ impl Renderer {
 
 fn view(
     scene: &Scene<'_>,
+    lamps: &[Light],
     size: [u32; 2],
     [jitter, shading_jitter]: [[f32; 2]; 2],
     previous: Option<Mat4>,
@@ -652,7 +682,7 @@ fn view(
         has_environment: u32::from(scene.environment.is_some()),
         jitter,
         near: NEAR_METRES,
-        light_count: scene.lights.len() as u32,
+        light_count: lamps.len() as u32,
         shading_jitter,
         depth_origin_mm: 1000.0 * nearest_head(scene, &view_from_world),
         padding: 0.0,
@@ -671,6 +701,9 @@ fn nearest_head(scene: &Scene<'_>, view_from_world: &Mat4) -> f32 {
 
 /// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
 const PICTURE_MARGIN: f32 = 1.25;
+
+/// Cosine between the camera's view and the way to a lamp from which the lamp stands behind the heads.
+const BEHIND_COSINE: f32 = 0.4;
 
 /// Adds all heads to the integral of `reference-surface`.
 fn integrate(
@@ -732,17 +765,59 @@ fn world_from_head(instance: &crate::scene::HeadInstance<'_>) -> Mat4 {
         * Mat4::from_rotation_translation(instance.state.head_rotation, instance.state.head_translation)
 }
 
+/// The lamps of a scene and, where the environment's light is to pass through thin parts and no lamp with shadows
+/// shines from behind the heads, a dark one there whose shadow map tells how thick they are.
+fn lamps(scene: &Scene<'_>, settings: &Settings) -> Vec<Light> {
+    let mut lamps = scene.lights.to_vec();
+    let (center, _) = bounding_sphere(scene);
+    let view = (center - scene.camera.position).normalize_or(Vec3::NEG_Z);
+    let is_behind = |l: &Light| {
+        let direction = match l.kind {
+            LightKind::Directional { direction } => direction,
+            LightKind::Spot { position, .. } | LightKind::Point { position } => center - position,
+        };
+        l.casts_shadow && direction.normalize_or_zero().dot(view) < -BEHIND_COSINE
+    };
+    let transmits = settings.transmit == TransmitMethod::ShadowDepth
+        && !matches!(settings.scatter, ScatterMethod::ReferenceSurface(_));
+    if transmits && scene.environment.is_some() && lamps.len() < MAX_LIGHTS && !lamps.iter().any(is_behind) {
+        let kind = LightKind::Directional { direction: -view };
+        lamps.push(Light { kind, color_linear: Vec3::ZERO, radius: 0.0, casts_shadow: true });
+    }
+    lamps
+}
+
+/// Where the heads are lit for a picture: what the camera sees of them, and for the integral over the surface also what
+/// is turned away.
+fn receivers(scene: &Scene<'_>, settings: &Settings) -> Vec<Sphere> {
+    let [width, height] = settings.size;
+    let clip_from_view = scene.camera.clip_from_view(width as f32 / height as f32);
+    let is_surface = matches!(settings.scatter, ScatterMethod::ReferenceSurface(_));
+    let viewer = Viewer {
+        position: scene.camera.position,
+        clip_from_world: clip_from_view * scene.camera.view_from_world(),
+        margin: if is_surface { PICTURE_MARGIN } else { 1.0 },
+        sees_backs: is_surface,
+    };
+    let of_head = |h: &crate::scene::HeadInstance<'_>| {
+        clusters::visible(&h.head.clusters, &h.state.shapes, world_from_head(h), &viewer)
+    };
+    scene.heads.iter().flat_map(of_head).collect()
+}
+
 /// Lights for the shader, and (view, layer) of those that cast shadows.
 fn place_lights(
     scene: &Scene<'_>,
+    lamps: &[Light],
     shadows: &wgpu::Texture,
+    receivers: &[Sphere],
 ) -> ([GpuLight; MAX_LIGHTS], Vec<(LightView, wgpu::TextureView)>) {
     let (center, radius) = bounding_sphere(scene);
     let mut gpu_lights: [GpuLight; MAX_LIGHTS] = bytemuck::Zeroable::zeroed();
     let mut layers = Vec::new();
-    for (slot, light) in gpu_lights.iter_mut().zip(scene.lights) {
+    for (slot, light) in gpu_lights.iter_mut().zip(lamps) {
         let shadow = light.casts_shadow.then(|| {
-            let view = LightView::fit(&light.kind, center, radius);
+            let view = LightView::fit(&light.kind, center, radius).narrowed(&light.kind, receivers);
             let layer = layers.len() as u32;
             let target = shadows.create_view(&wgpu::TextureViewDescriptor {
                 dimension: Some(wgpu::TextureViewDimension::D2),

@@ -7,6 +7,7 @@ use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, resize_area};
 use wgpu::util::DeviceExt;
 
+use crate::clusters::{Cluster, clusters};
 use crate::error::RenderError;
 use crate::footprint::mask_size;
 use crate::gpu::Gpu;
@@ -68,6 +69,8 @@ pub struct HeadOnGpu {
     pub(crate) maps: Option<MapsOnGpu>,
     pub(crate) skin_color: wgpu::TextureView,
     pub(crate) bounds: (Vec3, Vec3),
+    /// Where its opaque parts can be.
+    pub(crate) clusters: Vec<Cluster>,
     /// Bytes of buffers and textures on the device.
     pub memory_bytes: u64,
 }
@@ -148,6 +151,7 @@ impl HeadOnGpu {
             maps,
             skin_color,
             bounds,
+            clusters: clusters(head),
             memory_bytes: 0,
         };
         result.memory_bytes = result.count_bytes();

@@ -17,6 +17,7 @@
 //! # Ok::<(), rubor_renderer::RenderError>(())
 //! ```
 
+mod clusters;
 mod environment;
 mod error;
 pub mod footprint;
@@ -44,5 +45,6 @@ pub use pass_timer::{FrameTimes, PassTimer};
 pub use passes::antialias;
 pub use passes::appearance::{AppearanceMethods, ColorMethod, WrinkleMethod};
 pub use passes::scatter::ScatterMethod;
+pub use passes::scatter::surface::BARE_SKIN;
 pub use passes::shade::TransmitMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

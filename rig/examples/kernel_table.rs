@@ -15,7 +15,13 @@ fn main() -> Result<(), SkinError> {
         "| taps | method | squared error R / G / B | misplaced light R / G / B |\n| --- | --- | --- | --- |"
     );
     for samples in [9, 17, 33] {
-        for method in [KernelMethod::LineSpread, KernelMethod::LeastSquares, KernelMethod::SingularValue] {
+        let methods = [
+            KernelMethod::Edges,
+            KernelMethod::LineSpread,
+            KernelMethod::LeastSquares,
+            KernelMethod::SingularValue,
+        ];
+        for method in methods {
             let report = kernel_report(&profile, method, samples)?;
             let squared = report.errors.map(|e| format!("{:.1} %", 100.0 * e.root_mean_square)).join(" / ");
             let misplaced = report.errors.map(|e| format!("{:.1} %", 100.0 * e.misplaced)).join(" / ");

@@ -96,11 +96,28 @@ fn published() {
         );
     }
     println!("mean CIEDE2000: Xiao, de Rigal, ColorChecker, Monk; tone 8 alone");
-    for eumelanin_share in [0.5, 0.61, 0.74, 0.87, 1.0] {
-        for epidermis_thickness_mm in [0.05, 0.06, 0.07, 0.08, 0.1] {
-            let model = ChromophoreModel { eumelanin_share, epidermis_thickness_mm, ..Default::default() };
+    for eumelanin_share in [0.61, 0.74, 0.87] {
+        for [epidermis_thickness_mm, stratum_corneum_thickness_mm] in [
+            [0.05, 0.004],
+            [0.05, 0.008],
+            [0.06, 0.0],
+            [0.06, 0.004],
+            [0.06, 0.006],
+            [0.06, 0.008],
+            [0.06, 0.012],
+            [0.08, 0.006],
+        ] {
+            let model = ChromophoreModel {
+                eumelanin_share,
+                epidermis_thickness_mm,
+                stratum_corneum_thickness_mm,
+                ..Default::default()
+            };
             let fits = fits(&model);
-            print!("eumelanin {eumelanin_share}, epidermis {epidermis_thickness_mm} mm:");
+            print!(
+                "eumelanin {eumelanin_share}, epidermis {epidermis_thickness_mm} mm, \
+                 horny layer {stratum_corneum_thickness_mm} mm:"
+            );
             for source in [Source::Xiao2017, Source::DeRigal2010, Source::ColorChecker, Source::Monk2019] {
                 let of: Vec<f32> = (PUBLISHED.iter().zip(&fits))
                     .filter(|(p, _)| p.source == source)

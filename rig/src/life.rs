@@ -196,10 +196,12 @@ impl Life {
         let sway = f64::from(self.sway.at(time_s));
         if sway > 0.0 {
             for (axis, degrees) in [0.55, 0.4, 0.35].into_iter().enumerate() {
-                motion.head_degrees[axis] += (sway * degrees * wander(self.seed, 30 + axis as u32, time_s)) as f32;
+                motion.head_degrees[axis] +=
+                    (sway * degrees * wander(self.seed, 30 + axis as u32, time_s)) as f32;
             }
             for (axis, metres) in [0.0011, 0.0005, 0.0009].into_iter().enumerate() {
-                motion.translation[axis] += (sway * metres * wander(self.seed, 40 + axis as u32, time_s)) as f32;
+                motion.translation[axis] +=
+                    (sway * metres * wander(self.seed, 40 + axis as u32, time_s)) as f32;
             }
         }
         motion

@@ -49,6 +49,47 @@ pub fn predict(head: &Head, model: &StrainModel, name: &str, deformed: &[Vec3], 
     }
 }
 
+/// A state of a head that has a distribution: what a model can be fitted to.
+#[derive(Clone, Debug)]
+pub struct KnownState<'a> {
+    /// Deformed points of the head.
+    pub deformed: Vec<Vec3>,
+    /// Its scale and bias, of any size.
+    pub distribution: &'a Distribution,
+}
+
+/// The coefficients of blood that come closest to the distributions of some states by least squares over the skin; those
+/// of wrinkles stay as they are. A coefficient that no strain speaks of stays too.
+///
+/// # Panics
+/// When a state has another number of points than the head.
+pub fn fit(head: &Head, model: &StrainModel, states: &[KnownState<'_>], mean: &Map) -> StrainModel {
+    let texels = SkinTexels::new(head, mean.width, mean.height);
+    let skin = texels.mask();
+    // Compression and stretch never meet in one place, so their normal equations part.
+    let (mut compression, mut stretch, mut area) = ([0.0f64; 2], [0.0f64; 2], [0.0f64; 2]);
+    let add = |sums: &mut [f64; 2], x: f64, y: f64| *sums = [sums[0] + x * y, sums[1] + x * x];
+    for state in states {
+        let strain: Vec<f32> = point_strain(&head.mesh, &state.deformed).iter().map(|s| s.area).collect();
+        let strain = texels.map_of_points(&strain);
+        for i in (0..mean.values.len()).filter(|i| skin.mapped[*i] && mean.values[*i] > 1e-6) {
+            let u = ((i as u32 % mean.width) as f32 + 0.5) / mean.width as f32;
+            let v = ((i as u32 / mean.width) as f32 + 0.5) / mean.height as f32;
+            let x = f64::from(strain.values[i]);
+            let bias = f64::from(state.distribution.bias.sample(u, v, 0) / mean.values[i]) - 1.0;
+            add(if x < 0.0 { &mut compression } else { &mut stretch }, x, bias);
+            add(&mut area, x, f64::from(state.distribution.scale.sample(u, v, 0)) - 1.0);
+        }
+    }
+    let slope = |[xy, xx]: [f64; 2], before: f32| if xx > 1e-9 { (xy / xx) as f32 } else { before };
+    StrainModel {
+        bias_per_compression: slope(compression, model.bias_per_compression),
+        bias_per_stretch: slope(stretch, model.bias_per_stretch),
+        scale_per_area: slope(area, model.scale_per_area),
+        ..*model
+    }
+}
+
 /// Mean of a map over the skin, weighted by a mask of any size; 0 where the mask is empty.
 fn weighted_mean(map: &Map, weights: &Map, skin: &Mask) -> f32 {
     let (mut sum, mut weight) = (0.0, 0.0);
@@ -100,6 +141,33 @@ mod tests {
         let still = predict(&head, &StrainModel::default(), "joy", &head.mesh.points, &mean);
         assert!(still.distribution.bias.values.iter().all(|b| (b - 0.05).abs() < 1e-7));
         assert_eq!(still.zone_weights, [0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_fit_finds_the_coefficients_that_made_the_maps() {
+        let head = sheet(Vec2::ZERO, Vec2::ONE);
+        let truth = StrainModel {
+            bias_per_compression: -0.7,
+            bias_per_stretch: 0.2,
+            scale_per_area: 1.1,
+            ..Default::default()
+        };
+        let mean = Map::filled(16, 16, &[0.05]);
+        let moved =
+            |f: f32| -> Vec<Vec3> { head.mesh.points.iter().map(|p| Vec3::new(f * p.x, p.y, p.z)).collect() };
+        let distributions =
+            [0.8, 1.3].map(|f| predict(&head, &truth, "state", &moved(f), &mean).distribution);
+        let states: Vec<_> = [0.8, 1.3]
+            .into_iter()
+            .zip(&distributions)
+            .map(|(f, distribution)| KnownState { deformed: moved(f), distribution })
+            .collect();
+        let found = fit(&head, &StrainModel::default(), &states, &mean);
+        assert!(
+            (found.bias_per_compression + 0.7).abs() < 1e-3 && (found.bias_per_stretch - 0.2).abs() < 1e-3
+        );
+        assert!((found.scale_per_area - 1.1).abs() < 1e-3, "{found:?}");
+        assert_eq!(fit(&head, &truth, &[], &mean), truth);
     }
 
     #[test]

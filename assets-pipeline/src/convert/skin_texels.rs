@@ -7,8 +7,9 @@ use rubor_rig::mask::{Mask, fill_unmapped};
 
 use super::ConvertError;
 
-/// Distance beyond its edges at which a triangle still counts, texels: a bilinear fetch at an edge reads that far.
-const GUTTER_TEXELS: f32 = 0.75;
+/// Distance beyond its edges at which a triangle still counts, texels: rounding. More would let the background of
+/// photographs in; what a bilinear fetch reads beyond an edge is filled from the skin.
+const GUTTER_TEXELS: f32 = 0.02;
 const EMPTY: u32 = u32::MAX;
 
 /// Share of a map's data that must lie on the skin of a head (or of the skin that must have data) to be its layout.

@@ -10,7 +10,6 @@ use rubor_rig::head::ProvenanceKind;
 
 use crate::failure::{Failure, Outcome};
 use crate::inputs::{self, LoadedHead};
-use crate::sequence_job::neutral_color;
 
 /// Arguments that all conversions have.
 #[derive(Debug, Args)]
@@ -98,13 +97,14 @@ pub(crate) fn write_head(loaded: &LoadedHead, output: &Path, small: bool) -> Out
         None => Rig::default_rig()?,
     };
     let options = Options {
-        base_color: neutral_color(&loaded.head, if small { 1024 } else { 2048 }),
-        rig: Some(serde_json::to_value(rig).map_err(Failure::job)?),
+        color_map_size: if small { 1024 } else { 2048 },
+        rig: Some(&rig),
         morph_normals: !small,
         maps: if small { MapEncodings::small() } else { exact() },
         ..Options::default()
     };
-    rubor_assets::export::gltf::write(&loaded.head, &options, output).map_err(Failure::input)
+    rubor_assets::export::gltf::write(&loaded.head, &options, output)?;
+    Ok(())
 }
 
 /// Measured blood and pigment keep 16 bits: 8 over the range of a map with a mole in it leave few for the skin.

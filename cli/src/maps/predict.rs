@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use rubor_assets::convert::into_head::{self, Origin};
-use rubor_assets::convert::prediction::{Prediction, correlation, predict};
+use rubor_assets::convert::prediction::{KnownState, Prediction, correlation, fit, predict};
 use rubor_assets::convert::skin_texels::SkinTexels;
 use rubor_rig::bind::BoundRig;
 use rubor_rig::deform::deform_points;
@@ -35,6 +35,9 @@ pub(crate) struct PredictArgs {
     /// Coefficients (JSON), such as {"bias_per_compression": 0.6}
     #[arg(long)]
     model: Option<PathBuf>,
+    /// Fit the coefficients of blood to the distributions that the head has, and predict with these
+    #[arg(long)]
+    fit: bool,
     /// Write a head (.glb) with the distributions and wrinkle weights that it lacked
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -56,8 +59,11 @@ struct Expression {
 pub(super) fn run(a: &PredictArgs) -> Outcome<Value> {
     let mut loaded = inputs::head(Some(&a.head))?;
     let mut rig = inputs::rig(a.rig.as_deref(), loaded.rig.clone())?;
-    let model = model(a)?;
+    let mut model = model(a)?;
     let mean = mean_of(&loaded.head)?;
+    if a.fit {
+        model = fitted(&loaded.head, &rig, &model, &mean)?;
+    }
     let expressions = expressions(&loaded.head, &rig, &model, &mean)?;
     if expressions.is_empty() {
         return Err(Failure::input("the rig has no expression, so there is nothing to predict"));
@@ -102,6 +108,23 @@ fn model(a: &PredictArgs) -> Outcome<StrainModel> {
     let text = std::fs::read_to_string(file)
         .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", file.display())))?;
     serde_json::from_str(&text).map_err(|e| Failure::input(format!("{}: {e}", file.display())))
+}
+
+/// The model with coefficients from the expressions that have a distribution of their name.
+fn fitted(head: &Head, rig: &Rig, model: &StrainModel, mean: &Map) -> Outcome<StrainModel> {
+    let expressions = expressions(head, rig, model, mean)?;
+    let known = |e: &Expression| {
+        let distribution = head.maps.distributions.iter().find(|d| d.name == e.name)?;
+        let deformed = deform_points(&head.mesh, &head.shapes, &e.face.shapes);
+        Some(KnownState { deformed, distribution })
+    };
+    let states: Vec<_> = expressions.iter().filter_map(known).collect();
+    if states.is_empty() {
+        return Err(Failure::input(
+            "--fit: found no distribution with the name of an expression, expected one",
+        ));
+    }
+    Ok(fit(head, model, &states, mean))
 }
 
 /// Every expression of a rig at full weight, alone.

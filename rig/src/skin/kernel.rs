@@ -1,7 +1,8 @@
 //! Separable kernels: a profile as two one-dimensional passes (Jimenez 2012, chapter 6).
 //!
 //! ```text
-//! profile --> light of each cell of a grid of taps --> line spread     (sums of rows)
+//! profile --> spectrum --> edges     (straight edges of light in all directions)
+//!        +--> light of each cell of a grid of taps --> line spread     (sums of rows)
 //!                                                 +--> singular value  (best separable kernel by eq. 6.3)
 //!                                                 +--> least squares   (best of the family of eq. 6.1)
 //! artist's width, strength, falloff --------------------> eq. 6.1
@@ -29,7 +30,10 @@ const COVERAGE: f64 = 0.99;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KernelMethod {
-    /// The profile's line spread function: exact for light that varies along one axis, as across a straight shadow.
+    /// Least squares over straight edges of light in all directions; what frames use.
+    Edges,
+    /// The profile's line spread function: exact for light that varies along one axis, as across an upright shadow, and
+    /// farthest off across a diagonal one, where the product of two line spreads is wider than the profile.
     LineSpread,
     /// The family of [`ArtistKernel`], fitted to the 2D kernel by constrained non-linear least squares (6.1-6.3).
     LeastSquares,
@@ -90,10 +94,10 @@ pub struct KernelError {
 }
 
 impl SeparableKernel {
-    /// The line spread kernel of a profile with an odd number of taps, 5 to 65.
+    /// The kernel of [`KernelMethod::Edges`] of a profile with an odd number of taps, 5 to 65.
     pub fn of(profile: &Profile, samples: usize) -> Result<Self, SkinError> {
         check_samples(samples)?;
-        Ok(line_spread(profile, &Grid::new(samples, half_width_mm(profile)?)))
+        Ok(edges(profile, &Grid::new(samples, half_width_mm(profile)?)))
     }
 
     /// The kernel of an artist's parameters.
@@ -140,6 +144,7 @@ pub fn kernel_report(
     let separability = decompositions.each_ref().map(|e| e.eigenvalues.amax() / e.eigenvalues.abs().sum());
     let mut artist = None;
     let kernel = match method {
+        KernelMethod::Edges => edges(profile, &grid),
         KernelMethod::LineSpread => line_spread(profile, &grid),
         KernelMethod::SingularValue => {
             SeparableKernel::mirrored(&grid, decompositions.each_ref().map(|e| grid.first_vector(e)))
@@ -231,6 +236,63 @@ fn fit_artist(grid: &Grid, exact: &[DMatrix<f64>; 3]) -> ArtistKernel {
 
 fn line_spread(profile: &Profile, grid: &Grid) -> SeparableKernel {
     let half = profile.channels.each_ref().map(|channel| grid.cells(|x| channel.line_cdf(x)));
+    SeparableKernel::mirrored(grid, half)
+}
+
+/// Waves of the edges of [`edges`], from this over the half width on, evenly in the logarithm, and their directions
+/// from an axis to the diagonal.
+const LONGEST_WAVE: f64 = 0.2;
+const SHORTEST_WAVE: f64 = 43.0;
+const WAVES: usize = 60;
+const DIRECTIONS: usize = 10;
+/// Pull of each weight towards the line spread, where edges do not tell it from its neighbours.
+const PULL: f64 = 0.1;
+
+/// The kernel that blurs straight edges of light, of all directions alike, as the profile does: the spectrum of a
+/// separable kernel is the product of its line's at the two components of a wave, that of the profile is the spectrum of
+/// its line spread at the length of the wave; an edge holds waves k in proportion to 1 / k.
+fn edges(profile: &Profile, grid: &Grid) -> SeparableKernel {
+    let half = profile.channels.each_ref().map(|channel| {
+        let start = normalized(grid.cells(|x| channel.line_cdf(x)));
+        let width = grid.width_mm();
+        // The line spread in steps far finer than any wave, out to where its rest is folded in.
+        let fine = Grid::new(801, 4.0 * width);
+        let (places, light) = (&fine.half, normalized(fine.cells(|x| channel.line_cdf(x))));
+        let spectrum = |places: &[f64], light: &[f64], k: f64| {
+            light[0] + 2.0 * places.iter().zip(light).skip(1).map(|(x, w)| w * (k * x).cos()).sum::<f64>()
+        };
+        let wave = |i: usize| {
+            let t = i as f64 / (WAVES - 1) as f64;
+            LONGEST_WAVE / width * (SHORTEST_WAVE / LONGEST_WAVE).powf(t)
+        };
+        let truth: Vec<f64> = (0..WAVES).map(|i| spectrum(places, &light, wave(i))).collect();
+        // Power 1 / k^2 over steps of k in proportion to k.
+        let share: Vec<f64> = (0..WAVES).map(|i| wave(i).powf(-0.5)).collect();
+        let norm = (DIRECTIONS as f64 * share.iter().map(|s| s * s).sum::<f64>()).sqrt();
+        let taps = grid.half.len() - 1;
+        let cosines = |part: fn(f64) -> f64| {
+            DMatrix::from_fn(WAVES * DIRECTIONS, taps, |row, tap| {
+                let angle = std::f64::consts::FRAC_PI_4 * (row % DIRECTIONS) as f64 / (DIRECTIONS - 1) as f64;
+                2.0 * ((wave(row / DIRECTIONS) * part(angle) * grid.half[tap + 1]).cos() - 1.0)
+            })
+        };
+        let (along, across) = (cosines(f64::cos), cosines(f64::sin));
+        // With the centre as what is left to one, a line's spectrum is 1 + sum of w (2 cos - 2).
+        let residual = |weights: &[f64]| {
+            let w = DVector::from_column_slice(weights);
+            let (a, b) = (&along * &w, &across * &w);
+            DVector::from_fn(WAVES * DIRECTIONS + taps, |row, _| match row.checked_sub(WAVES * DIRECTIONS) {
+                Some(tap) => PULL * (weights[tap] - start[tap + 1]),
+                None => {
+                    let i = row / DIRECTIONS;
+                    ((1.0 + a[row]) * (1.0 + b[row]) - truth[i]) * share[i] / norm
+                }
+            })
+        };
+        let (found, _) = levenberg_marquardt(residual, &start[1..], &vec![(0.0, 0.5); taps], 1e-5);
+        let center = (1.0 - 2.0 * found.iter().sum::<f64>()).max(0.0);
+        std::iter::once(center).chain(found).collect()
+    });
     SeparableKernel::mirrored(grid, half)
 }
 

@@ -61,8 +61,10 @@ fn averaged(map: &Map) -> Map {
         for x in 0..width {
             let (rows, columns) = (range(y, height, map.height), range(x, width, map.width));
             let count = (rows.len() * columns.len()) as f32;
-            let sum: f32 =
-                rows.flat_map(|r| columns.clone().map(move |c| (c, r))).map(|(c, r)| map.texel(c, r)[0]).sum();
+            let sum: f32 = rows
+                .flat_map(|r| columns.clone().map(move |c| (c, r)))
+                .map(|(c, r)| map.texel(c, r)[0])
+                .sum();
             out.values[(y * width + x) as usize] = sum / count;
         }
     }
@@ -87,11 +89,11 @@ pub(crate) fn roots(head: &Head, triangles: &[[u32; 4]]) -> Vec<Root> {
         }
     }
     let (low, high) = head.bounds().unwrap_or_default();
-    let top = head
-        .landmarks
-        .get("vertex")
-        .copied()
-        .unwrap_or(Vec3::new(0.5 * (low.x + high.x), high.y, 0.5 * (low.z + high.z)));
+    let top = head.landmarks.get("vertex").copied().unwrap_or(Vec3::new(
+        0.5 * (low.x + high.x),
+        high.y,
+        0.5 * (low.z + high.z),
+    ));
     let crown = top + CROWN;
 
     let mut random = Random(1);

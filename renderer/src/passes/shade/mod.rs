@@ -8,18 +8,23 @@
 //! ```
 //!
 //! Theory: barycentrics and their screen derivatives from ray-plane volumes (exact under perspective); wrinkles as
-//! partial-derivative normals (papers/004 section 8.2); hemoglobin and skin colour (section 7.6); Kelemen and
+//! partial-derivative normals or as differences of normals (papers/004 sections 8.2 and 8.2.1); hemoglobin and skin colour (section 7.6); Kelemen and
 //! Szirmay-Kalos specular with the Beckmann distribution (papers/002, papers/004); percentage-closer soft shadows;
 //! order-2 spherical harmonics and a prefiltered map for the environment; multiple-bounce ambient occlusion.
 //!
 //! Differs from the sources: slope variance that minification hides widens the Beckmann lobe (Toksvig 2005), and so
 //! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
 //!
-//! Transmittance (papers/004 ch. 5): light through thin parts from the depth in shadow maps and T(s), added to the
-//! diffuse light that is scattered next. Lamps without shadows transmit nothing. For the environment, which has no
-//! shadow map, the thickness is that which a lamp behind the surface sees.
+//! Transmittance (papers/004 ch. 5): light through thin parts from shadow maps and T(s), added to the diffuse light that
+//! is scattered next. Differs from the source: it sums the profile over what the light shines on around its ray, the
+//! integral of eq. 5.8 with the surface that the shadow map holds, so tilt, thickness and the edges of thin parts need
+//! no guess (no reversed normal, no 0.3 wrap, no shrinking); what the camera sees is left to `scatter`. Lamps without
+//! shadows transmit nothing. For the environment, which has no shadow map, a lamp behind the surface tells the
+//! thickness; where none shines from behind the head, `frame` places a dark one there.
 //!
 //! Does not: reflect one part of the head in another.
+
+mod directional_albedo;
 
 use std::fmt;
 use std::str::FromStr;
@@ -96,9 +101,8 @@ impl FromStr for TransmitMethod {
 
 /// Entries of T(s): a step of 0.03 mm for skin.
 const TRANSMITTANCE_ENTRIES: usize = 256;
-/// Millimetres that a point is moved inwards before its depth is compared: 0.005 of a head (papers/004 listing 5.1).
-const SHRINK_MM: f32 = 1.2;
-
+/// Rings of the plane across a light; `TRANSMIT_RINGS` of the shader.
+const RINGS: usize = 4;
 /// A light as the shader reads it; the fields are described there.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -122,12 +126,13 @@ pub(crate) struct Params {
     pub(crate) environment_levels: f32,
     pub(crate) has_maps: u32,
     pub(crate) wrinkle_map_count: u32,
-    pub(crate) transmit: [f32; 4],
     pub(crate) hair_color: [f32; 4],
     pub(crate) is_second_sample: u32,
+    pub(crate) transmit_per_mm: f32,
     pub(crate) adds_differences: u32,
     pub(crate) pupil_mm: f32,
-    pub(crate) padding: u32,
+    pub(crate) ring_taps_mm: [f32; RINGS],
+    pub(crate) ring_ends_mm: [f32; RINGS],
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
@@ -181,6 +186,8 @@ pub(crate) struct Lighting<'a> {
 pub(crate) struct Transmittance {
     table: wgpu::TextureView,
     thickness_max_mm: f32,
+    ring_taps_mm: [f32; RINGS],
+    ring_ends_mm: [f32; RINGS],
 }
 
 impl Transmittance {
@@ -197,11 +204,43 @@ impl Transmittance {
             *last = [0.0; 4];
         }
         let size = [texels.len() as u32, 1];
+        let (ring_taps_mm, ring_ends_mm) = rings(&table);
         Ok(Self {
+            ring_taps_mm,
+            ring_ends_mm,
             table: crate::texture::upload_half(gpu, "transmittance", size, &[vec![texels]]),
             thickness_max_mm: table.thickness_max_mm as f32,
         })
     }
+}
+
+/// Radii of taps and outer edges of rings that hold equal shares of the light that reaches a point from a plane behind
+/// it, where the plane is so deep that a quarter of the farthest-reaching channel comes through; the last ring has no end.
+fn rings(table: &TransmittanceTable) -> ([f32; RINGS], [f32; RINGS]) {
+    // T falls, so bisect.
+    let thickness_at = |share: f64| {
+        let (mut low, mut high) = (0.0, table.thickness_max_mm);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if table.sample(middle).into_iter().fold(0.0, f64::max) > share {
+                low = middle
+            } else {
+                high = middle
+            }
+        }
+        low
+    };
+    let depth_mm = thickness_at(0.25);
+    let radius =
+        |outside: f64| (thickness_at(0.25 * outside).powi(2) - depth_mm.powi(2)).max(0.0).sqrt() as f32;
+    let taps = std::array::from_fn(|i| radius(1.0 - (i as f64 + 0.5) / RINGS as f64));
+    let ends =
+        std::array::from_fn(
+            |i| {
+                if i + 1 < RINGS { radius(1.0 - (i + 1) as f64 / RINGS as f64) } else { 1e6 }
+            },
+        );
+    (taps, ends)
 }
 
 /// What it reads of one head.
@@ -226,6 +265,8 @@ pub(crate) struct Shade {
     compare: wgpu::Sampler,
     black: wgpu::TextureView,
     black_array: wgpu::TextureView,
+    /// Share of an even sky that the specular lobe reflects.
+    directional_albedo: wgpu::TextureView,
 }
 
 impl Shade {
@@ -237,7 +278,10 @@ impl Shade {
         };
         let sampler = |d: &wgpu::SamplerDescriptor<'_>| gpu.device.create_sampler(d);
         let black = crate::texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]);
+        let side = [directional_albedo::SIDE; 2];
+        let table = vec![vec![directional_albedo::table()]];
         Self {
+            directional_albedo: crate::texture::upload_half(gpu, "directional albedo", side, &table),
             pipeline: gpu.compute_pipeline("shade", SHADER, "shade"),
             samples_pipeline: None,
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
@@ -289,6 +333,7 @@ impl Shade {
                 texture(lighting.first.map_or(lighting.ids, |f| f.0)),
                 texture(lighting.first.map_or(lighting.depth, |f| f.1)),
                 texture(lighting.transmittance.map_or(&self.black, |t| &t.table)),
+                texture(&self.directional_albedo),
             ],
         );
         let head = gpu.bind(
@@ -411,10 +456,9 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
         is_second_sample: u32::from(lighting.first.is_some()),
         adds_differences: u32::from(shaded.wrinkles == WrinkleMethod::Difference),
         pupil_mm: shaded.pupil_mm,
-        padding: 0,
-        transmit: lighting
-            .transmittance
-            .map_or([0.0; 4], |t| [1.0 / t.thickness_max_mm, SHRINK_MM, 0.0, 0.0]),
+        transmit_per_mm: lighting.transmittance.map_or(0.0, |t| 1.0 / t.thickness_max_mm),
+        ring_taps_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_taps_mm),
+        ring_ends_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_ends_mm),
         hair_color: maps.map_or([0.0; 4], |m| {
             let [r, g, b] = m.hair_color_linear;
             [r, g, b, 1.0]

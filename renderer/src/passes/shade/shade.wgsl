@@ -26,18 +26,19 @@ struct Params {
     // 1 where the head has maps.
     has_maps: u32,
     wrinkle_map_count: u32,
-    // x = 1 / thickness of the last entry of T(s), 1 / mm, or 0 for no transmittance; y = millimetres that positions are
-    // moved inwards.
-    transmit: vec4f,
     // rgb = albedo of hair drawn with the skin.
     hair_color: vec4f,
     // 1 where the pixel has a first sample whose light may do for this one.
     is_second_sample: u32,
+    // 1 / thickness of the last entry of T(s), 1 / mm, or 0 for no transmittance.
+    transmit_per_mm: f32,
     // 1 where differences of normals add instead of slopes.
     adds_differences: u32,
     // Diameter of the pupils, millimetres.
     pupil_mm: f32,
-    padding_1: u32,
+    // Radii of the taps and outer edges of the rings around the ray of a light, mm.
+    ring_taps_mm: vec4f,
+    ring_ends_mm: vec4f,
     // Real spherical harmonics of the environment's irradiance / pi, rgb.
     harmonics: array<vec4f, 9>,
     lights: array<Light, 8>,
@@ -56,6 +57,8 @@ struct Params {
 @group(0) @binding(10) var first_depth: texture_depth_2d;
 // T(s): rgb over thickness.
 @group(0) @binding(11) var transmittance: texture_2d<f32>;
+// Reflected share of an even sky: r times f0, plus g; the cosine of the viewer along a row, roughness down.
+@group(0) @binding(12) var directional_albedo: texture_2d<f32>;
 
 @group(1) @binding(0) var<storage, read> positions: array<vec4f>;
 @group(1) @binding(1) var<storage, read> vertices: array<Vertex>;
@@ -80,6 +83,8 @@ struct Params {
 // Radiance that is not scattered: specular, and everything of eyes and teeth.
 @group(2) @binding(2) var direct_out: texture_storage_2d<rgba16float, write>;
 
+// Share of a neighbour that scattering gives back for each millimetre off the tangent plane.
+const FOLLOW_PER_MM = 0.25;
 const MAX_MELANIN = 0.5;
 const MAX_HEMOGLOBIN = 0.32;
 
@@ -92,6 +97,8 @@ const GUMS = 4u;
 
 struct Surface {
     position: vec3f,
+    // Position on the smooth surface that the normals describe, for shadow rays.
+    lifted: vec3f,
     // Of the triangle, towards the viewer.
     facet: vec3f,
     normal: vec3f,
@@ -139,7 +146,7 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < view.light_count; i++) {
         add_light(params.lights[i], surface, to_viewer, turn, &diffuse, &specular);
     }
-    if params.transmit.x > 0.0 && surface.scattering > 0.0 {
+    if params.transmit_per_mm > 0.0 && surface.scattering > 0.0 {
         diffuse += transmitted(surface, turn);
     }
 
@@ -219,6 +226,11 @@ fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f
     surface.facet = back * normalize(facet);
     surface.smooth_normal = back * normalize(here.x * f0.normal + here.y * f1.normal + here.z * f2.normal);
     surface.occlusion = clamp(here.x * f0.occlusion + here.y * f1.occlusion + here.z * f2.occlusion, 0.0, 1.0);
+    // From the facet onto the tangent planes of its corners, or facets show in the shade of a terminator (Hanika 2021,
+    // "Hacking the shadow terminator").
+    surface.lifted = surface.position - here.x * min(dot(surface.position - a, back * f0.normal), 0.0) * back * f0.normal
+        - here.y * min(dot(surface.position - b, back * f1.normal), 0.0) * back * f1.normal
+        - here.z * min(dot(surface.position - c, back * f2.normal), 0.0) * back * f2.normal;
     let along = here.x * f0.tangent + here.y * f1.tangent + here.z * f2.tangent;
     let tangent = normalize(along - surface.smooth_normal * dot(along, surface.smooth_normal));
     let bitangent = f0.bitangent_sign * cross(surface.smooth_normal, tangent) * back;
@@ -400,7 +412,7 @@ fn add_light(
         return;
     }
     if light.shape.y >= 0.0 {
-        irradiance *= shadow(light, surface, to_light, turn);
+        irradiance *= shadow(light, surface, lit, turn);
     }
     // A bump cannot see a light that its surface does not face.
     let horizon = smoothstep(-0.05, 0.10, facing);
@@ -420,39 +432,46 @@ fn add_light(
 
 const BLOCKER_SAMPLES = 10u;
 const FILTER_SAMPLES = 16u;
+// Widest search for blockers, metres; the shadow map has this much room around what it lights.
+const WIDEST_METRES = 0.012;
+// Depth change for a millimetre across at which the plane of a surface is followed no further (79 degrees).
+const STEEPEST = 5.0;
 
-// Percentage-closer soft shadows (Fernando 2005): the mean depth of blockers sets the width of the filter.
-fn shadow(light: Light, surface: Surface, to_light: vec3f, turn: f32) -> f32 {
-    let near = light.shape.z;
-    let far = light.shape.w;
+// Percentage-closer soft shadows (Fernando 2005): the mean depth of blockers sets the width of the filter. Every tap is
+// compared with the plane of the receiver and not with its depth, so wide filters need no larger bias than narrow ones.
+fn shadow(light: Light, surface: Surface, lit: Arriving, turn: f32) -> f32 {
     let resolution = f32(textureDimensions(shadows).x);
     var across = light.shadow.x;
     if light.position.w > 0.0 {
-        across *= dot(light.position.xyz - surface.position, to_light);
+        across *= dot(light.position.xyz - surface.position, lit.to_light);
     }
     let texel = across / resolution;
-    // Move off the surface by what a filter tap can see of it: more where the light grazes.
-    let facing = clamp(dot(surface.facet, to_light), 0.05, 1.0);
-    let lift = texel * (0.6 + 1.8 * sqrt(1.0 - facing * facing)) * sign(dot(surface.facet, surface.smooth_normal));
-    let p = surface.position + surface.facet * lift + to_light * texel;
+    let facing = dot(surface.facet, lit.to_light);
+    // Off the surface by what bilinear taps can see of it.
+    let p = surface.lifted + texel * (surface.facet + lit.to_light);
     let clip = light.clip_from_world * vec4f(p, 1.0);
     let ndc = clip.xyz / clip.w;
     if any(abs(ndc.xy) > vec2f(1.0)) || ndc.z > 1.0 || clip.w <= 0.0 {
         return 1.0;
     }
+    let m = light.clip_from_world;
+    let axes = mat2x3f(normalize(vec3f(m[0].x, m[1].x, m[2].x)), normalize(vec3f(m[0].y, m[1].y, m[2].y)));
+    var slope = surface.facet * axes / max(facing, 0.01);
+    slope *= min(1.0, STEEPEST * inverseSqrt(max(dot(slope, slope), 1e-6)));
+    let uv_per_metre = vec2f(1.0, -1.0) / across;
     let center = ndc.xy * vec2f(0.5, -0.5) + 0.5;
     let layer = i32(light.shape.y);
     let receiver = shadow_metres(light, ndc.z);
 
     // Search as far as the source could reach over a typical gap of 5 cm.
-    let reach = clamp(light.color.w * select(1.0, 1.0 / receiver, light.position.w > 0.0) * 0.05 / across, 2.0 / resolution, 0.06);
+    let reach = clamp(0.05 * lit.spread, 2.0 * texel, WIDEST_METRES);
     var blocked = 0.0;
     var blocker = 0.0;
     for (var i = 0u; i < BLOCKER_SAMPLES; i++) {
-        let at = center + reach * vogel_disk(i, BLOCKER_SAMPLES, turn);
-        let texel_at = vec2i(clamp(at, vec2f(0.0), vec2f(0.9999)) * resolution);
-        let d = shadow_metres(light, textureLoad(shadows, texel_at, layer, 0));
-        if d < receiver - texel {
+        let offset = reach * vogel_disk(i, BLOCKER_SAMPLES, turn);
+        let at = vec2i(clamp(center + offset * uv_per_metre, vec2f(0.0), vec2f(0.9999)) * resolution);
+        let d = shadow_metres(light, textureLoad(shadows, at, layer, 0));
+        if d < receiver + dot(slope, offset) - texel {
             blocked += 1.0;
             blocker += d;
         }
@@ -461,51 +480,87 @@ fn shadow(light: Light, surface: Surface, to_light: vec3f, turn: f32) -> f32 {
         return 1.0;
     }
     blocker /= blocked;
-    var penumbra = (receiver - blocker) * light.color.w;
+    var penumbra = (receiver - blocker) * lit.spread;
     if light.position.w > 0.0 {
-        penumbra /= blocker;
+        penumbra *= receiver / blocker;
     }
-    let width = clamp(penumbra / across, 1.2 / resolution, 0.05);
-    // Wider filters see more of their own slope.
-    let bias = (width * across * 0.6 * sqrt(1.0 - facing * facing) / facing) * 0.5;
-    let reference = shadow_depth(light, max(receiver - bias, near));
-    var lit = 0.0;
+    let width = clamp(penumbra, 1.2 * texel, WIDEST_METRES);
+    var light_seen = 0.0;
     for (var i = 0u; i < FILTER_SAMPLES; i++) {
-        let at = center + width * vogel_disk(i, FILTER_SAMPLES, turn);
-        lit += textureSampleCompareLevel(shadows, compare, at, layer, reference);
+        let offset = width * vogel_disk(i, FILTER_SAMPLES, turn);
+        let reference = shadow_depth(light, max(receiver + dot(slope, offset), light.shape.z));
+        light_seen += textureSampleCompareLevel(shadows, compare, center + offset * uv_per_metre, layer, reference);
     }
-    return lit / f32(FILTER_SAMPLES);
+    return light_seen / f32(FILTER_SAMPLES);
 }
 
 // ---- Transmittance ----
 
-const THICKNESS_SAMPLES = 6u;
-// Radius over which thickness is averaged, metres: what light forgets on its way through a millimetre or two.
-const THICKNESS_RADIUS = 0.001;
-// Transmitted light starts this much before the terminator (papers/004 eq. 5.13).
-const WRAP = 0.3;
+// Rings of the plane across the light, each with a tap on two opposite sides.
+const TRANSMIT_RINGS = 4u;
+// Of the golden angle.
+const GOLDEN_COSINE = -0.73736888;
+const GOLDEN_SINE = 0.67549029;
+// Cosine past the terminator over which light from hidden sides fades out where the light shines on the front.
+const FADE = 0.3;
+// Cosine from which a lamp counts as behind the surface, for the thickness.
+const LEAST_THROUGH = 0.3;
 
 fn transmittance_at(thickness_mm: f32) -> vec3f {
     let entries = f32(textureDimensions(transmittance).x);
-    let x = clamp(thickness_mm * params.transmit.x, 0.0, 1.0) * (entries - 1.0) + 0.5;
+    let x = clamp(thickness_mm * params.transmit_per_mm, 0.0, 1.0) * (entries - 1.0) + 0.5;
     return textureSampleLevel(transmittance, linear_clamp, vec2f(x / entries, 0.5), 0.0).rgb;
 }
 
-// Light that comes through from behind: papers/004 eqs. 5.11 and 5.13, with the irradiance of the back from the reversed
-// vertex normal. Diffuse radiance of a white surface.
+// Depth of what a light shines on at a place of its map, texels.
+fn depth_of_light(light: Light, at: vec2f, resolution: f32) -> f32 {
+    return textureLoad(shadows, vec2i(clamp(at, vec2f(0.0), vec2f(resolution - 1.0))), i32(light.shape.y), 0);
+}
+
+// Share of the light of a lit point that the screen does not scatter to this one: all of it where another surface hides
+// the point, else what its distance from the tangent plane keeps back.
+fn unseen(surface: Surface, way_mm: vec3f) -> f32 {
+    let off_plane = saturate(FOLLOW_PER_MM * abs(dot(way_mm, surface.smooth_normal)));
+    let clip = view.clip_from_world * vec4f(surface.position + 1e-3 * way_mm, 1.0);
+    let ndc = clip.xy / clip.w;
+    if clip.w <= 0.0 || any(abs(ndc) >= vec2f(1.0)) {
+        return 1.0;
+    }
+    let pixel = vec2i((ndc * vec2f(0.5, -0.5) + 0.5) * vec2f(view.size));
+    // How deep the point is under what the pixel shows, across the surface: where in the pixel it lies does not matter.
+    let ray = pixel_ray(view, vec2f(pixel) + 0.5, view.jitter);
+    let shown = view.origin.xyz + view_depth(view, textureLoad(depth, pixel, 0)) * ray;
+    let under_mm = 1e3 * dot(shown - surface.position, surface.facet) - dot(way_mm, surface.facet);
+    return max(off_plane, smoothstep(0.2, 0.6, under_mm));
+}
+
+// Light that arrives from what a light shines on and the camera does not see (papers/004 eq. 5.8), as diffuse radiance
+// of a white surface.
+//
+// A texel of the shadow map is a piece of the lit surface, and the light on it is that of its cross-section whatever its
+// tilt: M = sum of R(distance) times irradiance across the light times cross-section. The plane across the light is cut
+// into rings; the light of a ring at a depth is the difference of T at the distances of its edges, so a slab that
+// faces the light gives T(s) exactly, and its sum over opposite taps knows slopes.
+//
+// The environment has no shadow map: a lamp behind the surface tells how much of its light comes through.
 fn transmitted(surface: Surface, turn: f32) -> vec3f {
     var sum = vec3f(0.0);
-    var thinnest_mm = 1e6;
+    // T of the thickness.
+    var from_behind = vec3f(0.0);
+    let reach_mm = surface.scattering / params.transmit_per_mm;
+    let resolution = f32(textureDimensions(shadows).x);
+    let cosine = cos(turn);
+    let sine = sin(turn);
     for (var i = 0u; i < view.light_count; i++) {
         let light = params.lights[i];
         let lit = arriving(light, surface.position);
         let through = -dot(surface.smooth_normal, lit.to_light);
-        if light.shape.y < 0.0 || through <= -WRAP || all(lit.irradiance <= vec3f(0.0)) {
+        let is_dark = all(lit.irradiance <= vec3f(0.0));
+        let tells_thickness = view.has_environment == 1u && through > LEAST_THROUGH;
+        if light.shape.y < 0.0 || through <= -FADE || (is_dark && !tells_thickness) {
             continue;
         }
-        // Inside of the surface every ray of the shadow map meets the head (section 5.5).
-        let p = surface.position - 1e-3 * params.transmit.y * surface.smooth_normal;
-        let clip = light.clip_from_world * vec4f(p, 1.0);
+        let clip = light.clip_from_world * vec4f(surface.position, 1.0);
         let ndc = clip.xyz / clip.w;
         if any(abs(ndc.xy) > vec2f(1.0)) || clip.w <= 0.0 {
             continue;
@@ -515,29 +570,53 @@ fn transmitted(surface: Surface, turn: f32) -> vec3f {
         if light.position.w > 0.0 {
             across *= receiver;
         }
-        let center = ndc.xy * vec2f(0.5, -0.5) + 0.5;
-        let resolution = f32(textureDimensions(shadows).x);
-        var passed = vec3f(0.0);
-        var thickest_mm = 0.0;
-        for (var tap = 0u; tap < THICKNESS_SAMPLES; tap++) {
-            let at = center + THICKNESS_RADIUS / across * vogel_disk(tap, THICKNESS_SAMPLES, turn);
-            let texel = vec2i(clamp(at, vec2f(0.0), vec2f(0.9999)) * resolution);
-            let entry = shadow_metres(light, textureLoad(shadows, texel, i32(light.shape.y), 0));
-            // Negative where the ray passes beside the surface, as it does along the terminator: nothing comes through.
-            let thickness_mm = 1e3 * (receiver - entry) + params.transmit.y * max(through, 0.0);
-            passed += select(vec3f(0.0), transmittance_at(thickness_mm), thickness_mm > 0.0);
-            thickest_mm = max(thickest_mm, thickness_mm);
+        let m = light.clip_from_world;
+        let right = normalize(vec3f(m[0].x, m[1].x, m[2].x));
+        let up = normalize(vec3f(m[0].y, m[1].y, m[2].y));
+        let center = (ndc.xy * vec2f(0.5, -0.5) + 0.5) * resolution;
+        let texels_per_mm = 1e-3 * resolution / across * vec2f(1.0, -1.0);
+        // Depths of the map that are within reach: most taps are not, and cost no more than this comparison.
+        let nearest = shadow_depth(light, max(receiver - 1e-3 * reach_mm, light.shape.z));
+        let farthest = shadow_depth(light, receiver + 1e-3 * reach_mm);
+        // Two opposite taps tell whether there is a thin part at all.
+        let probe = surface.scattering * params.ring_taps_mm.y * vec2f(cosine, sine);
+        let first = depth_of_light(light, center + texels_per_mm * probe, resolution);
+        let second = depth_of_light(light, center - texels_per_mm * probe, resolution);
+        if !(first > nearest && first < farthest) && !(second > nearest && second < farthest) {
+            continue;
         }
-        passed /= f32(THICKNESS_SAMPLES);
-        sum += lit.irradiance * max(WRAP + through, 0.0) * passed / PI;
-        if through > 0.0 && thickest_mm > params.transmit.y * through {
-            thinnest_mm = min(thinnest_mm, thickest_mm);
+        var passed = vec3f(0.0);
+        var direction = vec2f(cosine, sine);
+        var inner_mm = 0.0;
+        for (var ring = 0u; ring < TRANSMIT_RINGS; ring++) {
+            let outer_mm = params.ring_ends_mm[ring];
+            for (var side = -1.0; side < 2.0; side += 2.0) {
+                let offset_mm = side * surface.scattering * params.ring_taps_mm[ring] * direction;
+                let raw = depth_of_light(light, center + texels_per_mm * offset_mm, resolution);
+                if raw > nearest && raw < farthest {
+                    let depth_mm = 1e3 * (receiver - shadow_metres(light, raw));
+                    let way_mm = offset_mm.x * right + offset_mm.y * up + depth_mm * lit.to_light;
+                    let share = unseen(surface, way_mm);
+                    if share > 0.0 {
+                        let d = depth_mm / surface.scattering;
+                        passed += share * (transmittance_at(length(vec2f(inner_mm, d)))
+                            - transmittance_at(length(vec2f(outer_mm, d))));
+                    }
+                }
+            }
+            inner_mm = outer_mm;
+            direction = vec2f(
+                GOLDEN_COSINE * direction.x - GOLDEN_SINE * direction.y,
+                GOLDEN_SINE * direction.x + GOLDEN_COSINE * direction.y,
+            );
+        }
+        sum += lit.irradiance * smoothstep(-FADE, 0.0, through) * passed * (0.5 / PI);
+        if tells_thickness {
+            from_behind = max(from_behind, passed * (0.5 / through));
         }
     }
     if view.has_environment == 1u {
-        // The environment has no shadow map: a lamp behind the surface knows how thick it is.
-        sum += params.environment_intensity * surface.occlusion * harmonic_irradiance(-surface.smooth_normal)
-            * transmittance_at(thinnest_mm);
+        sum += params.environment_intensity * surface.occlusion * harmonic_irradiance(-surface.smooth_normal) * from_behind;
     }
     return sum;
 }
@@ -597,8 +676,10 @@ fn ambient_specular(surface: Surface, to_viewer: vec3f) -> vec3f {
     let level = sqrt(surface.roughness) * (params.environment_levels - 1.0);
     let uv = vec2f(atan2(r.x, -r.z) / (2.0 * PI) + 0.5, acos(clamp(r.y, -1.0, 1.0)) / PI);
     let radiance = textureSampleLevel(environment, trilinear_repeat, uv, level).rgb;
-    // Rough surfaces never reach the full grazing reflectance (Lagarde 2014).
-    let fresnel = surface.f0 + (max(1.0 - surface.roughness, surface.f0) - surface.f0) * pow5(1.0 - cosine);
+    let side = f32(textureDimensions(directional_albedo).x);
+    let entry = (vec2f(cosine, surface.roughness) * (side - 1.0) + 0.5) / side;
+    let reflected = textureSampleLevel(directional_albedo, linear_clamp, entry, 0.0).rg;
+    let fresnel = min(surface.f0 * reflected.r + reflected.g, 1.0);
     // A cavity hides what the reflection would show (Lagarde and de Rousiers 2014, eq. 67).
     let hidden = clamp(pow(cosine + surface.occlusion, exp2(-16.0 * surface.roughness - 1.0)) - 1.0 + surface.occlusion, 0.0, 1.0);
     return params.environment_intensity * surface.specular * fresnel * hidden * radiance;

@@ -4,13 +4,15 @@
 //! positions, light --shadow--> depth layer (0 near, 1 far)
 //! ```
 //!
-//! Theory: shadow maps (Williams 1978), fitted to the sphere around the heads of the frame, so that a close-up has
-//! the resolution of the head and not of the room. All triangles are drawn, front and back: a mouth or a nostril must
+//! Theory: shadow maps (Williams 1978). A map shows what the camera sees of the heads and no more, so a close-up of a nose
+//! has the resolution of the nose; whatever stands before that towards the light is in it. Windows come in steps, so
+//! that shadows do not crawl as the camera moves. All triangles are drawn, front and back: a mouth or a nostril must
 //! block light from either side. The soft edge is in `shade` (percentage-closer soft shadows).
 
 use glam::camera::rh::{proj, view};
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3, Vec4};
 
+use crate::clusters::Sphere;
 use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
@@ -33,6 +35,15 @@ pub(crate) struct LightView {
     /// Metres across the map, at 1 m for lights with a place.
     pub(crate) across: f32,
 }
+
+/// Room around what receives shadows, metres: half the widest search for blockers, and what light crosses in skin.
+const MARGIN_METRES: f32 = 0.012;
+/// Windows in a doubling of their size.
+const WINDOW_STEPS: f32 = 4.0;
+/// Smallest window as a share of the whole map's width.
+const LEAST_WINDOW: f32 = 1.0 / 32.0;
+/// Windows move by this share of their width: whole texels of any map of a power of two from 64.
+const WINDOW_MOVES: f32 = 1.0 / 64.0;
 
 impl LightView {
     /// Fits a view to a sphere (metres).
@@ -61,6 +72,44 @@ impl LightView {
                 Self { clip_from_world: projection * view, near, far, across: 2.0 * tangent }
             }
         }
+    }
+
+    /// The part of the view that holds spheres, as a square; all of it where that is no smaller.
+    pub(crate) fn narrowed(self, kind: &LightKind, receivers: &[Sphere]) -> Self {
+        let is_perspective = kind.position().is_some();
+        let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+        for s in receivers {
+            let clip = self.clip_from_world * s.center.extend(1.0);
+            let radius = s.radius + MARGIN_METRES;
+            let (near, far) = match is_perspective {
+                true => ((clip.w - radius).max(self.near), clip.w + radius),
+                false => (1.0, 1.0),
+            };
+            let center = Vec2::new(clip.x, clip.y);
+            let reach = Vec2::splat(2.0 * radius / self.across);
+            // The nearer end of the sphere is farther from the middle of the picture.
+            let out = |v: Vec2, sign: f32| {
+                let at = |x: f32| x / if x * sign > 0.0 { near } else { far };
+                Vec2::new(at(v.x), at(v.y))
+            };
+            low = low.min(out(center - reach, -1.0));
+            high = high.max(out(center + reach, 1.0));
+        }
+        let (low, high) = (low.max(Vec2::NEG_ONE), high.min(Vec2::ONE));
+        let half = 0.5 * (high - low).max_element() * (1.0 + 2.0 * WINDOW_MOVES);
+        let half = ((half.max(LEAST_WINDOW).log2() * WINDOW_STEPS).ceil() / WINDOW_STEPS).exp2();
+        if !(low.cmplt(high).all() && half < 1.0) {
+            return self;
+        }
+        let step = 2.0 * half * WINDOW_MOVES;
+        let center = (0.5 * (low + high) / step).round() * step;
+        let window = Mat4::from_cols(
+            Vec4::X / half,
+            Vec4::Y / half,
+            Vec4::Z,
+            Vec4::new(-center.x / half, -center.y / half, 0.0, 1.0),
+        );
+        Self { clip_from_world: window * self.clip_from_world, across: half * self.across, ..self }
     }
 }
 
@@ -145,6 +194,34 @@ mod tests {
                 let p = view.clip_from_world.project_point3(center + 0.149 * offset);
                 assert!(p.x.abs() <= 1.0 && p.y.abs() <= 1.0 && (0.0..=1.0).contains(&p.z), "{kind:?} {p}");
             }
+        }
+    }
+
+    #[test]
+    fn a_window_holds_what_it_is_made_for_and_little_else() {
+        let center = Vec3::new(0.1, 1.5, -0.2);
+        let kinds = [
+            LightKind::Directional { direction: Vec3::new(0.3, -1.0, -0.2) },
+            LightKind::Point { position: Vec3::new(0.5, 2.0, 1.0) },
+        ];
+        for kind in kinds {
+            let whole = LightView::fit(&kind, center, 0.15);
+            let receivers =
+                [0.0, 0.02].map(|x| Sphere { center: center + Vec3::new(x, 0.05, 0.03), radius: 0.01 });
+            let view = whole.narrowed(&kind, &receivers);
+            assert!(view.across < 0.4 * whole.across, "{} of {}", view.across, whole.across);
+            for s in receivers {
+                for offset in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
+                    let p = view.clip_from_world.project_point3(s.center + s.radius * offset);
+                    assert!(p.x.abs() <= 1.0 && p.y.abs() <= 1.0, "{kind:?} {p}");
+                    // Depth is that of the whole map.
+                    let q = whole.clip_from_world.project_point3(s.center + s.radius * offset);
+                    assert!((p.z - q.z).abs() < 1e-5);
+                }
+            }
+            let everything = [Sphere { center, radius: 0.15 }];
+            assert_eq!(whole.narrowed(&kind, &everything).across, whole.across);
+            assert_eq!(whole.narrowed(&kind, &[]).across, whole.across);
         }
     }
 

@@ -70,6 +70,14 @@ pub fn epidermis(model: &ChromophoreModel, wavelength_nm: f64, melanin: f64, hem
     Medium { absorption_per_mm, scattering_per_mm: epidermis_scattering_per_mm(wavelength_nm) }
 }
 
+/// Horny layer: the epidermis without melanin and blood.
+pub fn stratum_corneum(wavelength_nm: f64) -> Medium {
+    Medium {
+        absorption_per_mm: baseline_per_mm(wavelength_nm),
+        scattering_per_mm: epidermis_scattering_per_mm(wavelength_nm),
+    }
+}
+
 /// Dermis with a hemoglobin fraction.
 pub fn dermis(model: &ChromophoreModel, wavelength_nm: f64, hemoglobin: f64) -> Medium {
     let absorption_per_mm = hemoglobin * blood_per_mm(wavelength_nm, model.oxygenation)

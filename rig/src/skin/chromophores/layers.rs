@@ -1,12 +1,12 @@
-//! Diffuse reflectance of two plane layers: discrete ordinates, exact up to the number of directions.
+//! Diffuse reflectance of plane layers: discrete ordinates, exact up to the number of directions.
 //!
-//! Theory. A finite epidermis on a semi-infinite dermis of the same index of refraction, under a smooth surface.
+//! Theory. Finite layers on a semi-infinite one of the same index of refraction, under a smooth surface.
 //! Scattering is isotropic with the reduced coefficient (similarity relation). With N directions mu_j of weight w_j
 //! on (0, 1], the azimuthal mean J of the radiance (times 2 pi) obeys
 //! `mu dJ/dtau = -J + (omega / 2) sum_j w_j (J_down + J_up)` (Chandrasekhar 1950, ch. 3). Its solutions are
 //! `J_down = e^(-k tau) / (1 - k mu)`, `J_up = e^(-k tau) / (1 + k mu)` for the roots +-k of
 //! `1 = omega sum_j w_j / (1 - k^2 mu_j^2)`. Boundary conditions give their amplitudes: the dermis becomes an N x N
-//! reflection matrix, the epidermis one linear system of size 2N.
+//! reflection matrix, and each layer above one linear system of size 2N: a new matrix, or a number under the surface.
 //!
 //! What is computed is the reflectance factor seen along the normal under diffuse light, without the light that the
 //! surface reflects: the d/0 geometry of skin colorimeters. By reciprocity it is also the fraction of a beam along the
@@ -190,8 +190,44 @@ impl Directions {
         half
     }
 
-    /// Diffuse reflectance of a layer of `thickness_mm` on a half space, 0 to 1.
+    /// A layer of `thickness_mm` on what lies below it, as what its top sends back.
+    pub fn over(&self, layer: Medium, thickness_mm: f64, base: &HalfSpace) -> HalfSpace {
+        const N: usize = STREAMS;
+        // One incident direction a column, and no surface above.
+        let mut entering = [[0.0; N]; N];
+        for j in 0..N {
+            entering[j][j] = 1.0;
+        }
+        let returned = self.slab::<N, { 3 * N }>(layer, thickness_mm, base, &[0.0; N], &entering);
+        let mut half = HalfSpace { reflection: [[0.0; N]; N], normal: [0.0; N] };
+        for (j, (up, normal)) in returned.into_iter().enumerate() {
+            for i in 0..N {
+                half.reflection[i][j] = up[i];
+            }
+            half.normal[j] = normal;
+        }
+        half
+    }
+
+    /// Diffuse reflectance of a layer of `thickness_mm` under the surface, on what lies below it, 0 to 1.
     pub fn reflectance(&self, layer: Medium, thickness_mm: f64, base: &HalfSpace) -> f64 {
+        let entering = self.entering.map(|e| [e]);
+        let [(_, normal)] =
+            self.slab::<1, { 2 * STREAMS + 1 }>(layer, thickness_mm, base, &self.reflectance, &entering);
+        // J is 2 pi times the radiance; the reflectance factor is pi times the radiance that leaves.
+        0.5 * self.leaving_normal * normal
+    }
+
+    /// For each column of `entering` (by direction) what goes up at the top of a layer in each direction and along the
+    /// normal. `surface` is the internal reflectance above it. `COLUMNS` is 2 N and the number of columns.
+    fn slab<const CASES: usize, const COLUMNS: usize>(
+        &self,
+        layer: Medium,
+        thickness_mm: f64,
+        base: &HalfSpace,
+        surface: &Vector,
+        entering: &[[f64; CASES]; STREAMS],
+    ) -> [(Vector, f64); CASES] {
         const N: usize = STREAMS;
         let depth = layer.extinction_per_mm() * thickness_mm;
         let roots = self.roots(layer.albedo());
@@ -199,13 +235,13 @@ impl Directions {
         let attenuation = roots.map(|k| (-k * depth).exp());
         // Unknowns: amplitudes of modes that decay downwards from the top, then of those that decay upwards from the
         // bottom. Rows: the top (down = surface * up + entering), then the bottom (up = base * down).
-        let mut system = [[0.0; 2 * N + 1]; 2 * N];
+        let mut system = [[0.0; COLUMNS]; 2 * N];
         for j in 0..N {
             for m in 0..N {
-                system[j][m] = with[j][m] - self.reflectance[j] * against[j][m];
-                system[j][N + m] = attenuation[m] * (against[j][m] - self.reflectance[j] * with[j][m]);
+                system[j][m] = with[j][m] - surface[j] * against[j][m];
+                system[j][N + m] = attenuation[m] * (against[j][m] - surface[j] * with[j][m]);
             }
-            system[j][2 * N] = self.entering[j];
+            system[j][2 * N..].copy_from_slice(&entering[j]);
             let row = &mut system[N + j];
             row[..N].copy_from_slice(&against[j]);
             row[N..2 * N].copy_from_slice(&with[j]);
@@ -223,33 +259,35 @@ impl Directions {
         solve(&mut system);
         // Radiance along the normal at the top: the source through e^-tau, plus what the base sends up.
         let beam = (-depth).exp();
-        let mut normal = 0.0;
-        let mut bottom_down = [0.0; N];
-        for m in 0..N {
-            let (a, b) = (system[m][2 * N], system[N + m][2 * N]);
-            let k = roots[m];
-            normal += a * source[m] * (1.0 - attenuation[m] * beam) / (k + 1.0);
-            // (e^-tau - e^(-k tau)) / (k - 1) has a removable pole where a root crosses 1.
-            let difference = (k - 1.0) * depth;
-            let upward = if difference.abs() < 1e-5 {
-                beam * depth * (1.0 - 0.5 * difference)
-            } else {
-                (beam - attenuation[m]) / (k - 1.0)
-            };
-            normal += b * source[m] * upward;
-            for j in 0..N {
-                bottom_down[j] += a * attenuation[m] * with[j][m] + b * against[j][m];
+        std::array::from_fn(|case| {
+            let mut normal = 0.0;
+            let (mut top_up, mut bottom_down) = ([0.0; N], [0.0; N]);
+            for m in 0..N {
+                let (a, b) = (system[m][2 * N + case], system[N + m][2 * N + case]);
+                let k = roots[m];
+                normal += a * source[m] * (1.0 - attenuation[m] * beam) / (k + 1.0);
+                // (e^-tau - e^(-k tau)) / (k - 1) has a removable pole where a root crosses 1.
+                let difference = (k - 1.0) * depth;
+                let upward = if difference.abs() < 1e-5 {
+                    beam * depth * (1.0 - 0.5 * difference)
+                } else {
+                    (beam - attenuation[m]) / (k - 1.0)
+                };
+                normal += b * source[m] * upward;
+                for j in 0..N {
+                    top_up[j] += a * against[j][m] + b * attenuation[m] * with[j][m];
+                    bottom_down[j] += a * attenuation[m] * with[j][m] + b * against[j][m];
+                }
             }
-        }
-        for j in 0..N {
-            normal += beam * base.normal[j] * bottom_down[j];
-        }
-        // J is 2 pi times the radiance; the reflectance factor is pi times the radiance that leaves.
-        0.5 * self.leaving_normal * normal
+            for j in 0..N {
+                normal += beam * base.normal[j] * bottom_down[j];
+            }
+            (top_up, normal)
+        })
     }
 }
 
-/// What a semi-infinite medium returns, without a surface.
+/// What a semi-infinite medium, or layers on one, return without a surface.
 #[derive(Clone, Debug)]
 pub struct HalfSpace {
     /// Radiance up in direction i by unit radiance down in direction j.

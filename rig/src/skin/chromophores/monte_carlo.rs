@@ -1,4 +1,4 @@
-//! Photon walks in the two layers: the truth that the fast solution is compared with.
+//! Photon walks in the layers: the truth that the fast solution is compared with.
 //!
 //! A beam enters along the normal; each collision absorbs a share of the photon's weight, and the smooth surface
 //! splits it when it comes back. Lateral position does not matter for total reflectance, so a photon is a depth and a
@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::coefficients::{Medium, dermis, epidermis};
+use super::coefficients::{Medium, dermis, epidermis, stratum_corneum};
 use super::layers::fresnel_reflectance;
 use super::{ChromophoreModel, spectral_weights};
 
@@ -44,9 +44,12 @@ pub fn reflectance(
     hemoglobin: f64,
     walk: Walk,
 ) -> (f64, f64) {
-    let layers =
-        [epidermis(model, wavelength_nm, melanin, hemoglobin), dermis(model, wavelength_nm, hemoglobin)]
-            .map(|m| Medium { scattering_per_mm: m.scattering_per_mm / (1.0 - walk.mean_cosine), ..m });
+    let layers = [
+        stratum_corneum(wavelength_nm),
+        epidermis(model, wavelength_nm, melanin, hemoglobin),
+        dermis(model, wavelength_nm, hemoglobin),
+    ]
+    .map(|m| Medium { scattering_per_mm: m.scattering_per_mm / (1.0 - walk.mean_cosine), ..m });
     let mut random = Random(walk.seed ^ wavelength_nm.to_bits());
     let entering = 1.0 - fresnel_reflectance(1.0, 1.0 / model.eta);
     let (mut sum, mut sum2) = (0.0, 0.0);
@@ -61,8 +64,10 @@ pub fn reflectance(
 }
 
 /// Weight of one photon that leaves through the surface.
-fn photon(layers: &[Medium; 2], model: &ChromophoreModel, mean_cosine: f64, random: &mut Random) -> f64 {
-    let boundary = model.epidermis_thickness_mm;
+fn photon(layers: &[Medium; 3], model: &ChromophoreModel, mean_cosine: f64, random: &mut Random) -> f64 {
+    let corneum = model.stratum_corneum_thickness_mm;
+    // Depth of the upper edge of each layer, and of the lower edge of the last.
+    let edges = [0.0, corneum, corneum + model.epidermis_thickness_mm, f64::INFINITY];
     let (mut depth, mut cosine, mut weight, mut escaped) = (0.0, 1.0, 1.0, 0.0);
     let mut layer = 0;
     loop {
@@ -70,12 +75,8 @@ fn photon(layers: &[Medium; 2], model: &ChromophoreModel, mean_cosine: f64, rand
         // Walk through layers and reflections until the optical path is used up.
         loop {
             let extinction = layers[layer].extinction_per_mm();
-            let to_edge: f64 = match (layer, cosine > 0.0) {
-                (0, true) => (boundary - depth) / cosine,
-                (0, false) => -depth / cosine,
-                (_, true) => f64::INFINITY,
-                (_, false) => (boundary - depth) / cosine,
-            };
+            let edge = if cosine > 0.0 { edges[layer + 1] } else { edges[layer] };
+            let to_edge: f64 = (edge - depth) / cosine;
             if free < to_edge * extinction {
                 depth += cosine * free / extinction;
                 break;
@@ -91,8 +92,8 @@ fn photon(layers: &[Medium; 2], model: &ChromophoreModel, mean_cosine: f64, rand
                     return escaped;
                 }
             } else {
-                depth = boundary;
-                layer = 1 - layer;
+                depth = edge;
+                layer = if cosine > 0.0 { layer + 1 } else { layer - 1 };
             }
         }
         weight *= layers[layer].albedo();

@@ -3,8 +3,8 @@ use crate::skin::diffusion::BetterDipole;
 use crate::skin::gaussians::{GaussianSum, GaussianTerm};
 use crate::skin::medium::{SKIN1, rgb_media};
 
-const METHODS: [KernelMethod; 3] =
-    [KernelMethod::LineSpread, KernelMethod::LeastSquares, KernelMethod::SingularValue];
+const METHODS: [KernelMethod; 4] =
+    [KernelMethod::Edges, KernelMethod::LineSpread, KernelMethod::LeastSquares, KernelMethod::SingularValue];
 
 fn better_dipole() -> Profile {
     let channel = |m| RadialProfile::BetterDipole(BetterDipole::new(m).unwrap());
@@ -62,7 +62,7 @@ fn a_single_gaussian_separates_exactly() {
 #[test]
 fn singular_value_has_a_smaller_squared_error_than_the_line_spread() {
     for profile in [Profile::deon_six(), better_dipole()] {
-        let [line, _, singular] = METHODS.map(|m| kernel_report(&profile, m, 17).unwrap());
+        let [_, line, _, singular] = METHODS.map(|m| kernel_report(&profile, m, 17).unwrap());
         for c in 0..3 {
             let error = |r: &KernelReport| r.errors[c].root_mean_square;
             assert!(error(&singular) < error(&line), "{c}: {} {}", error(&singular), error(&line));
@@ -135,4 +135,46 @@ fn wrong_parameters_are_errors() {
         assert_eq!(at(ArtistKernel { strength: [0.5, strength, 0.5], ..good }), "kernel.strength[1]");
     }
     assert_eq!(at(ArtistKernel { falloff: [0.5, 0.5, -0.1], ..good }), "kernel.falloff[2]");
+}
+
+/// Root mean square error across straight edges of a direction, over the half width: the integrals of kernel and profile
+/// up to a line.
+fn edge_error(profile: &Profile, kernel: &SeparableKernel, angle: f64) -> f64 {
+    let (sine, cosine) = angle.sin_cos();
+    let width = kernel.half_width_mm();
+    let (mut sum, n) = (0.0, 400);
+    for i in 0..n {
+        let x = width * ((i as f64 + 0.5) / n as f64 * 2.0 - 1.0);
+        let truth = 0.5 + 0.5 * x.signum() * profile.channels[0].line_cdf(x.abs());
+        let mut found = 0.0;
+        for (a, u) in kernel.weights.iter().zip(&kernel.offsets_mm) {
+            for (b, v) in kernel.weights.iter().zip(&kernel.offsets_mm) {
+                // Taps between texels weigh two: an edge is as soft as a pixel of a 30th of the width.
+                let side = (x - (cosine * u + sine * v)) / (width / 30.0) + 0.5;
+                found += a[0] * b[0] * side.clamp(0.0, 1.0);
+            }
+        }
+        sum += (found - truth).powi(2);
+    }
+    (sum / n as f64).sqrt()
+}
+
+#[test]
+fn edges_of_all_directions_blur_best_and_better_with_more_taps() {
+    let profile = Profile::deon_six();
+    let mean = |kernel: &SeparableKernel| {
+        let angles = (0..7).map(|i| std::f64::consts::FRAC_PI_4 * f64::from(i) / 6.0);
+        (angles.map(|a| edge_error(&profile, kernel, a).powi(2)).sum::<f64>() / 7.0).sqrt()
+    };
+    let of = |method, samples| kernel_report(&profile, method, samples).unwrap().kernel;
+    let errors = [9, 17, 33].map(|n| mean(&of(KernelMethod::Edges, n)));
+    assert!(errors[1] < errors[0] && errors[2] < 1.02 * errors[1], "{errors:?}");
+    for (samples, error) in [(17, errors[1]), (33, errors[2])] {
+        let line = mean(&of(KernelMethod::LineSpread, samples));
+        assert!(error < 0.75 * line, "{samples}: {error} {line}");
+    }
+    // The reason: across a diagonal edge the product of line spreads is at its worst, and more taps do not help.
+    let line = of(KernelMethod::LineSpread, 33);
+    let diagonal = edge_error(&profile, &line, std::f64::consts::FRAC_PI_4);
+    assert!(diagonal > 3.0 * edge_error(&profile, &line, 0.0), "{diagonal}");
 }

@@ -35,6 +35,9 @@ const ENTRIES: usize = 4096;
 const COVERAGE: f64 = 0.9999;
 /// Radius inside of which the surface counts as flat, mm; ears and lids are thicker.
 const NEAR_MM: f64 = 1.0;
+/// Strength from which a pixel counts as bare skin. Under hair it is lower: kernels are narrow there, few samples meet
+/// them, and what noise is left is not that of skin.
+pub const BARE_SKIN: f32 = 0.5;
 /// Cells of the grid in the radius of the kernel.
 const CELLS_PER_RADIUS: f32 = 2.0;
 /// Most cells of a grid; larger ones grow their cells.
@@ -344,7 +347,7 @@ impl Surface {
         pass.dispatch_workgroups(self.size[0].div_ceil(8), self.size[1].div_ceil(8), 1);
     }
 
-    /// Root mean square standard error of the mean over that of the result, all channels of all scattering pixels;
+    /// Root mean square standard error of the mean over that of the result, all channels of all pixels of bare skin;
     /// nothing from fewer than two batches.
     pub(crate) fn relative_noise(&self, gpu: &Gpu) -> Result<Option<f64>, RenderError> {
         let read = |b: &wgpu::Buffer| -> Result<Vec<[f32; 4]>, RenderError> {
@@ -354,7 +357,8 @@ impl Surface {
         let (mut error, mut signal) = (0.0, 0.0);
         for (s, q) in sums.iter().zip(&squares) {
             let n = f64::from(s[3]);
-            if n < 2.0 {
+            // The fourth sum of squares is that of the strength.
+            if n < 2.0 || f64::from(q[3]) < f64::from(BARE_SKIN) * n {
                 continue;
             }
             for c in 0..3 {

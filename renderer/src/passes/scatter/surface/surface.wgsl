@@ -84,7 +84,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     sum = sum * (params.sample_mm2 / (center.a * center.a)) + params.near_light.rgb * center.rgb;
     let slot = id.y * view.size.x + id.x;
     sums[slot] += vec4f(sum, 1.0);
-    squares[slot] += vec4f(sum * sum, 1.0);
+    squares[slot] += vec4f(sum * sum, center.a);
 }
 
 @compute @workgroup_size(8, 8)

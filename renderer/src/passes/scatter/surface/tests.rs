@@ -10,8 +10,8 @@ use rubor_rig::skin::profile::Profile;
 use crate::passes::antialias;
 use crate::testing::gpu;
 use crate::{
-    Camera, ColorTable, FrameStats, Gpu, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, ScatterMethod,
-    Scene, Settings, TransmitMethod,
+    Camera, ColorTable, EnvironmentMap, FrameStats, Gpu, HeadInstance, HeadOnGpu, Light, LightKind, Renderer,
+    ScatterMethod, Scene, Settings, TransmitMethod,
 };
 
 const MM: f32 = 1e-3;
@@ -34,10 +34,22 @@ fn head(quads: &[([[f32; 3]; 4], Material)]) -> Head {
     Head { name: "test".into(), mesh, ..Head::default() }
 }
 
+/// What shines on a test.
+struct Lit {
+    lights: Vec<Light>,
+    sky: Option<EnvironmentMap>,
+}
+
+impl From<Light> for Lit {
+    fn from(light: Light) -> Self {
+        Self { lights: vec![light], sky: None }
+    }
+}
+
 /// Diffuse light seen from +Z; the picture is `across_mm` wide on the plane z = 0.
 fn draw(
     head: &Head,
-    light: Light,
+    light: impl Into<Lit>,
     across_mm: f32,
     pixels: u32,
     scatter: ScatterMethod,
@@ -50,6 +62,8 @@ fn draw(
     let on_gpu = HeadOnGpu::new(renderer.gpu(), head, &color).unwrap();
     let state = FaceState::neutral(head);
     let distance_mm = 30.0;
+    let Lit { lights, sky } = light.into();
+    let sky = sky.map(|map| map.upload(renderer.gpu()));
     let scene = Scene {
         heads: &[HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }],
         camera: Camera {
@@ -58,9 +72,9 @@ fn draw(
             up: Vec3::Y,
             fov_degrees: 2.0 * (0.5 * across_mm / distance_mm).atan().to_degrees(),
         },
-        lights: &[light],
-        environment: None,
-        environment_intensity: 0.0,
+        lights: &lights,
+        environment: sky.as_ref(),
+        environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
     };
     let settings = Settings {
@@ -180,17 +194,54 @@ fn a_disk_of_light_gives_its_convolution() {
     assert!(error < 0.005, "{error}");
 }
 
-#[test]
-fn a_wedge_lit_from_behind_follows_the_transmittance() {
-    // From 0 mm at x = -50 to 11 mm at x = 50, seen from its flat side.
-    let slope = 0.11;
-    let quads = [
+/// Thickness of the wedge for each millimetre along x.
+const SLOPE: f64 = 0.11;
+
+/// From 0 mm at x = -50 to 11 mm at x = 50, seen from its flat side.
+fn wedge() -> Head {
+    head(&[
         (square(50.0, 0.0), Material::Skin),
         (
             [[-50.0, 50.0, 0.0], [50.0, 50.0, -11.0], [50.0, -50.0, -11.0], [-50.0, -50.0, 0.0]],
             Material::Skin,
         ),
-    ];
+    ])
+}
+
+#[test]
+fn a_sky_behind_a_wedge_comes_through() {
+    // Light only from behind: the order-2 harmonics of a half-lit sky.
+    let map = || EnvironmentMap::from_fn(64, 32, |d| Vec3::splat(if d.z < 0.0 { 3.0 } else { 0.0 }));
+    let lit = Lit { lights: Vec::new(), sky: Some(map()) };
+    let method = TransmitMethod::ShadowDepth;
+    let Some((found, _)) = draw(&wedge(), lit, 100.0, 40, ScatterMethod::None, method) else { return };
+    let lit = Lit { lights: Vec::new(), sky: Some(map()) };
+    let (without, _) = draw(&wedge(), lit, 100.0, 40, ScatterMethod::None, TransmitMethod::None).unwrap();
+    let profile = Profile::deon_six();
+    let mut compared = 0;
+    for (i, (f, w)) in found.iter().zip(&without).enumerate() {
+        let [x, y] = place(i, 40, 100.0);
+        let thickness = (x + 50.0) * SLOPE;
+        if !(1.0..9.9).contains(&thickness) || y.abs() > 45.0 {
+            continue;
+        }
+        for c in 0..3 {
+            let came = f64::from(f[c] - w[c]);
+            // The irradiance of the back, over pi, is the radiance of the half sky.
+            let expected = 3.0 * profile.channels[c].transmittance(thickness);
+            assert!(
+                (came - expected).abs() < 0.05 * expected + 3.0 / 400.0,
+                "{thickness}: {came} {expected}"
+            );
+            compared += 1;
+        }
+    }
+    assert!(compared > 1000, "{compared}");
+}
+
+#[test]
+fn a_wedge_lit_from_behind_follows_the_transmittance() {
+    let head = wedge();
     let light = Light {
         kind: LightKind::Directional { direction: Vec3::Z },
         color_linear: Vec3::splat(100.0),
@@ -199,7 +250,7 @@ fn a_wedge_lit_from_behind_follows_the_transmittance() {
     };
     let pixels = 40;
     let Some((found, _)) =
-        draw(&head(&quads), light, 100.0, pixels, ScatterMethod::None, TransmitMethod::ShadowDepth)
+        draw(&head, light, 100.0, pixels, ScatterMethod::None, TransmitMethod::ShadowDepth)
     else {
         return;
     };
@@ -207,17 +258,16 @@ fn a_wedge_lit_from_behind_follows_the_transmittance() {
     let mut compared = 0;
     for (i, f) in found.iter().enumerate() {
         let [x, y] = place(i, pixels as usize, 100.0);
-        let thickness = (x + 50.0) * slope;
+        let thickness = (x + 50.0) * SLOPE;
         if !(1.0..9.9).contains(&thickness) || y.abs() > 45.0 {
             continue;
         }
         for (c, channel) in profile.channels.iter().enumerate() {
-            // Light is averaged over a disk of 1 mm: half a millimetre to either side is its standard deviation.
-            let [thin, thick] = [-0.5, 0.5].map(|x| channel.transmittance(thickness + x * slope));
-            let mean = 0.5 * (thin + thick);
-            let expected = 1.3 * 100.0 / std::f64::consts::PI * mean;
+            // The back is at its distance from the pixel, and gets the light of its cross-section.
+            let cosine = 1.0 / SLOPE.hypot(1.0);
+            let expected = 100.0 / std::f64::consts::PI * cosine * channel.transmittance(thickness * cosine);
             // The table ends at a 512th.
-            let bound = 0.05 * expected + 1.3 * 100.0 / std::f64::consts::PI / 400.0;
+            let bound = 0.03 * expected + 100.0 / std::f64::consts::PI / 400.0;
             assert!(
                 (f64::from(f[c]) - expected).abs() < bound,
                 "{thickness} mm, channel {c}: {} not {expected}",
@@ -228,6 +278,42 @@ fn a_wedge_lit_from_behind_follows_the_transmittance() {
     }
     assert!(compared > 1000, "{compared}");
     // And without the method nothing comes through.
-    let dark = draw(&head(&quads), light, 100.0, 8, ScatterMethod::None, TransmitMethod::None).unwrap().0;
+    let dark = draw(&head, light, 100.0, 8, ScatterMethod::None, TransmitMethod::None).unwrap().0;
     assert!(dark.iter().all(|p| p[..3] == [0.0; 3]));
+}
+
+#[test]
+fn only_skin_scatters() {
+    // Strips side by side, one of each opaque material.
+    let materials: Vec<Material> = Material::ALL.into_iter().filter(|m| m.is_opaque()).collect();
+    let strip = |i: usize| {
+        let (left, right) = (-40.0 + 10.0 * i as f32, -30.0 + 10.0 * i as f32);
+        [[left, -40.0, 0.0], [right, -40.0, 0.0], [right, 40.0, 0.0], [left, 40.0, 0.0]]
+    };
+    let quads: Vec<_> = materials.iter().enumerate().map(|(i, m)| (strip(i), *m)).collect();
+    let light = Light {
+        kind: LightKind::Directional { direction: Vec3::NEG_Z },
+        color_linear: Vec3::splat(2.0),
+        radius: 0.0,
+        casts_shadow: false,
+    };
+    let pixels = 80;
+    let method = ScatterMethod::Separable(17);
+    let Some((found, _)) = draw(&head(&quads), light, 80.0, pixels, method, TransmitMethod::None) else {
+        return;
+    };
+    let mut seen = 0;
+    for (i, f) in found.iter().enumerate() {
+        let [x, y] = place(i, pixels as usize, 80.0);
+        let strip = ((x + 40.0) / 10.0).floor() as usize;
+        if y.abs() > 35.0 || strip >= materials.len() || (x + 40.0) % 10.0 < 2.0 || (x + 40.0) % 10.0 > 8.0 {
+            continue;
+        }
+        // What does not scatter is no diffuse light of skin: black, without strength.
+        let is_skin = materials[strip] == Material::Skin;
+        assert_eq!(f[3] > 0.0, is_skin, "{:?}: {f:?}", materials[strip]);
+        assert_eq!(f[..3] == [0.0; 3], !is_skin, "{:?}: {f:?}", materials[strip]);
+        seen += 1;
+    }
+    assert!(seen > 100 * materials.len(), "{seen}");
 }

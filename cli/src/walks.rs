@@ -1,0 +1,109 @@
+//! Photon walks kept between runs, in the user's cache folder.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use rubor_rig::error::SkinError;
+use rubor_rig::skin::medium::Medium;
+use rubor_rig::skin::monte_carlo::{AlbedoTable, TABLE_MAX_ALBEDO};
+
+use crate::failure::{Failure, Outcome};
+use crate::output;
+
+/// Walks that take less are not worth a file.
+const WORTH_KEEPING: Duration = Duration::from_secs(1);
+/// Random numbers of the walks.
+const SEED: u64 = 1;
+
+/// Media for which a table has an answer.
+///
+/// # Errors
+/// One absorbs nothing, or so little that a walk would not end.
+pub(crate) fn check(media: &[Medium; 3]) -> Result<(), SkinError> {
+    for medium in media {
+        let albedo = medium.albedo();
+        if albedo > TABLE_MAX_ALBEDO {
+            return Err(SkinError::new(
+                "medium.albedo",
+                albedo,
+                "an albedo of at most 0.999 for a photon walk",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The table of an anisotropy and an index, from the cache if it is there.
+///
+/// # Errors
+/// The walk's numbers are out of range.
+pub(crate) fn table(anisotropy: f64, eta: f64, photons: u64) -> Outcome<AlbedoTable> {
+    let file = cache_folder().map(|f| f.join(name(anisotropy, eta, photons)));
+    if let Some(kept) = file.as_ref().and_then(|f| read(f, anisotropy, eta)) {
+        return Ok(kept);
+    }
+    let start = Instant::now();
+    let table = AlbedoTable::build(anisotropy, eta, photons, SEED).map_err(Failure::input)?;
+    if start.elapsed() > WORTH_KEEPING
+        && let Some(file) = file
+    {
+        match keep(&file, &table) {
+            // JSON may round the last digit: every run goes on from the same numbers.
+            Ok(()) => return Ok(read(&file, anisotropy, eta).unwrap_or(table)),
+            // The result is there all the same.
+            Err(error) => eprintln!("note: the photon walk was not kept: {error}"),
+        }
+    }
+    Ok(table)
+}
+
+/// Everything that a walk depends on is in its file's name, and so is the version of the program that walked.
+fn name(anisotropy: f64, eta: f64, photons: u64) -> String {
+    format!("walk-{}-g{anisotropy}-eta{eta}-{photons}-{SEED}.json", env!("CARGO_PKG_VERSION"))
+}
+
+/// A table that is whole and of the right medium; anything else is walked again.
+fn read(file: &std::path::Path, anisotropy: f64, eta: f64) -> Option<AlbedoTable> {
+    let table: AlbedoTable = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
+    let walk = &table.result().walk;
+    (walk.anisotropy == anisotropy && walk.eta == eta).then_some(table)
+}
+
+fn keep(file: &std::path::Path, table: &AlbedoTable) -> Outcome {
+    if let Some(folder) = file.parent() {
+        output::folder(folder)?;
+    }
+    output::write(file, &serde_json::to_vec(table).map_err(Failure::job)?)
+}
+
+/// Where programs of this system keep what they can make again; `None` where no variable says.
+fn cache_folder() -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    let root = variable("XDG_CACHE_HOME").or_else(|| match std::env::consts::OS {
+        "windows" => variable("LOCALAPPDATA"),
+        "macos" => variable("HOME").map(|h| h.join("Library/Caches")),
+        _ => variable("HOME").map(|h| h.join(".cache")),
+    })?;
+    Some(root.join("rubor"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kept_table_reads_back_and_a_broken_or_other_one_does_not() {
+        let folder = std::env::temp_dir().join(format!("rubor-walks-{}", std::process::id()));
+        let file = folder.join(name(0.0, 1.3, 640));
+        let table = AlbedoTable::build(0.0, 1.3, 640, SEED).unwrap();
+        keep(&file, &table).unwrap();
+        assert_eq!(read(&file, 0.0, 1.3), Some(table));
+        assert_eq!(read(&file, 0.0, 1.4), None);
+        let whole = std::fs::read(&file).unwrap();
+        std::fs::write(&file, &whole[..whole.len() / 2]).unwrap();
+        assert_eq!(read(&file, 0.0, 1.3), None);
+        std::fs::remove_dir_all(&folder).unwrap();
+        let names = [name(0.0, 1.3, 640), name(0.8, 1.3, 640), name(0.0, 1.4, 640), name(0.0, 1.3, 641)];
+        assert!((1..4).all(|i| !names[..i].contains(&names[i])), "{names:?}");
+    }
+}
