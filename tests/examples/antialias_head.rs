@@ -37,7 +37,6 @@ fn settings(mode: Mode, supersampling: u32) -> Settings {
         appearance: AppearanceMethods::default(),
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(mode, Preset::High),
-        appearance: AppearanceMethods::default(),
         supersampling,
         shadow_size: 512,
         exposure: 1.8,
