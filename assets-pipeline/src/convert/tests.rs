@@ -122,10 +122,10 @@ fn albedo_goes_to_chromophores_and_back() {
     let codes = |c: &[f32]| [c[0], c[1], c[2]].map(|v| (srgb_encode(v) * 255.0).round());
     let colors = albedo.values.chunks_exact(3).zip(back.values.chunks_exact(3));
     for ((a, b), (before, after)) in melanin.values.iter().zip(&found.melanin.values).zip(colors) {
-        // Pale skin hardly shows its melanin, and least beside much blood: colours of the same 8-bit codes, or the next
-        // ones, may be 3e-3 of it apart.
+        // Pale skin hardly shows its melanin, and least beside much blood: no inversion can tell apart what has the same
+        // 8-bit codes or the next ones.
         let is_next = codes(before).into_iter().zip(codes(after)).all(|(p, q)| (p - q).abs() <= 1.0);
-        assert!((a - b).abs() < 0.05 * a + 2e-3 || (is_next && (a - b).abs() < 3e-3), "{a} {b}");
+        assert!((a - b).abs() < 0.05 * a + 2e-3 || is_next, "{a} {b}");
     }
 }
 
