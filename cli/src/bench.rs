@@ -26,7 +26,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
     /// That moment, seconds
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 5.0)]
     time: f64,
     /// Size of the frame in pixels
     #[arg(long, value_parser = inputs::parse_size, default_value = "1920x1080", value_name = "WxH")]

@@ -17,7 +17,7 @@ use crate::inputs;
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Heads (.glb, .gltf, .ma), rigs, sequences, retarget files (.json), recordings (.csv, .json); what is given
+    /// Heads (.glb, .gltf, .ma, .usda), rigs, sequences, retarget files (.json), recordings (.csv, .json); what is given
     /// together is checked together
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
@@ -35,6 +35,7 @@ pub(crate) struct Arguments {
 enum Kind {
     Gltf,
     Maya,
+    Usd,
     Rig,
     Sequence,
     Retarget,
@@ -46,6 +47,7 @@ impl Kind {
         match self {
             Self::Gltf => "glTF",
             Self::Maya => "Maya ASCII",
+            Self::Usd => "USD",
             Self::Rig => "rig",
             Self::Sequence => "sequence",
             Self::Retarget => "retarget file",
@@ -80,6 +82,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         let subject = match report.kind {
             Kind::Gltf => gltf(&report.file, &mut report.findings),
             Kind::Maya => maya(&report.file, &mut report.findings),
+            Kind::Usd => {
+                usd(&report.file, &mut report.findings);
+                None
+            }
             _ => None,
         };
         heads.extend(subject.map(|s| Subject { report: Some(i), ..s }));
@@ -102,8 +108,9 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             loaded.map_err(|e| reports[i].findings.push(Finding::error("", e.to_string()))).ok()
         })
         .collect();
-    let others = reports.iter().any(|r| !matches!(r.kind, Kind::Gltf | Kind::Maya));
-    if heads.is_empty() && others && !reports.iter().any(|r| matches!(r.kind, Kind::Gltf | Kind::Maya)) {
+    let needs_head = |r: &Report| !matches!(r.kind, Kind::Gltf | Kind::Maya | Kind::Usd);
+    let given = reports.iter().any(|r| matches!(r.kind, Kind::Gltf | Kind::Maya));
+    if !given && reports.iter().any(needs_head) {
         let built_in = inputs::head(None)?;
         heads.push(Subject { report: None, head: built_in.head, rig: built_in.rig, sequence: None });
     }
@@ -182,10 +189,11 @@ fn kind(file: &Path) -> Outcome<Kind> {
     match extension.as_str() {
         "glb" | "gltf" => Ok(Kind::Gltf),
         "ma" => Ok(Kind::Maya),
+        "usda" | "usd" | "usdc" | "usdz" => Ok(Kind::Usd),
         "csv" => Ok(Kind::Capture),
         "json" => json_kind(file),
         _ => Err(Failure::input(format!(
-            "{}: found a name that ends in .{extension}, expected .glb, .gltf, .ma, .csv or .json",
+            "{}: found a name that ends in .{extension}, expected .glb, .gltf, .ma, .usda, .csv or .json",
             file.display()
         ))),
     }
@@ -241,6 +249,13 @@ fn maya(file: &Path, findings: &mut Vec<Finding>) -> Option<Subject> {
             findings.push(Finding::error("", e.to_string()));
             None
         }
+    }
+}
+
+fn usd(file: &Path, findings: &mut Vec<Finding>) {
+    match std::fs::read(file) {
+        Ok(bytes) => findings.extend(check::usd::check(&bytes, file.parent().unwrap_or(Path::new("")))),
+        Err(e) => findings.push(Finding::error("", format!("cannot be read: {e}"))),
     }
 }
 

@@ -39,6 +39,9 @@ pub(crate) struct Arguments {
     /// How far weights may be from the performance where keys are left out; 0 keeps every authored key
     #[arg(long, default_value_t = 1e-5, value_name = "WEIGHT", value_parser = parse_tolerance)]
     tolerance: f32,
+    /// Straight lines between more keys instead of cubics, for programs that drop the slopes of keys (Blender)
+    #[arg(long)]
+    linear: bool,
     /// Pictures for other programs: png, jpeg, or webp (.glb only)
     #[arg(long, default_value = "jpeg", value_name = "FORMAT", value_parser = parse_textures)]
     textures: TextureFormat,
@@ -144,6 +147,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         rig: Some(&rig),
         sequence: sequence.as_ref(),
         tolerance: arguments.tolerance,
+        only_lines: arguments.linear,
         ..gltf::Options::default()
     };
     let exported = gltf::write(head, &options, path)?;

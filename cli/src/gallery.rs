@@ -35,10 +35,12 @@ struct Row {
 /// Three views of the whole head, a second each.
 const VIEWS: &str = r#"{ "fps": 1, "duration": 3, "camera": { "framing": "head", "elevationDegrees": 2, "target": [0, -0.02, -0.06],
     "orbitDegrees": [{ "t": 0, "v": 0 }, { "t": 1, "v": 38 }, { "t": 2, "v": 90 }] } }"#;
-/// An eye, the mouth and an ear from near.
-const DETAILS: &str = r#"{ "fps": 1, "duration": 3, "camera": { "framing": "close", "fovDegrees": 9,
-    "position": [{ "t": 0, "v": [0.0, 0.0, 0.45] }, { "t": 1, "v": [-0.1, -0.06, 0.48] }, { "t": 2, "v": [0.5, 0.0, 0.12] }],
-    "target": [{ "t": 0, "v": [0.026, 0.004, 0.0] }, { "t": 1, "v": [0.0, -0.07, 0.0] }, { "t": 2, "v": [0.07, -0.015, -0.09] }] } }"#;
+/// An eye, the mouth, an ear, the nose, the hairline, an eye from the side and the chin from near.
+const DETAILS: &str = r#"{ "fps": 1, "duration": 7, "camera": { "framing": "close", "fovDegrees": 9,
+    "position": [{ "t": 0, "v": [0.0, 0.0, 0.45] }, { "t": 1, "v": [-0.1, -0.06, 0.48] }, { "t": 2, "v": [0.5, 0.0, 0.12] },
+        { "t": 3, "v": [-0.16, -0.06, 0.46] }, { "t": 4, "v": [0.34, 0.16, 0.4] }, { "t": 5, "v": [-0.32, 0.0, 0.34] }, { "t": 6, "v": [0.2, -0.12, 0.44] }],
+    "target": [{ "t": 0, "v": [0.026, 0.004, 0.0] }, { "t": 1, "v": [0.0, -0.07, 0.0] }, { "t": 2, "v": [0.07, -0.015, -0.09] },
+        { "t": 3, "v": [0.0, -0.028, 0.01] }, { "t": 4, "v": [0.045, 0.055, -0.03] }, { "t": 5, "v": [-0.03, 0.003, -0.005] }, { "t": 6, "v": [0.02, -0.1, -0.02] }] } }"#;
 /// The three-quarter view.
 const THREE_QUARTER: &str = r#"{ "fps": 1, "duration": 1, "camera": { "framing": "head", "target": [0, -0.02, -0.06], "orbitDegrees": 36, "elevationDegrees": 2 } }"#;
 const FLUSH: &str = r#"{ "fps": 1, "duration": 2, "camera": { "framing": "close", "orbitDegrees": -12 },
@@ -77,6 +79,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         row("window", "window", THREE_QUARTER),
         row("backlit-ear", "backlit-ear", THREE_QUARTER),
         row("low-key", "low-key", THREE_QUARTER),
+        row("soft-box", "soft-box", THREE_QUARTER),
+        row("sky", "sky", THREE_QUARTER),
         row("three-point", "three-point", THREE_QUARTER),
         row("flush", "three-point", FLUSH),
     ];
@@ -130,8 +134,8 @@ mod tests {
     fn every_sequence_of_the_page_reads_and_fills_whole_rows() {
         let counts = [VIEWS, DETAILS, &emotions(), THREE_QUARTER, FLUSH]
             .map(|text| Sequence::from_json("gallery", text).unwrap().frame_count());
-        assert_eq!(counts, [3, 3, 6, 1, 2]);
-        assert_eq!((counts[0] + counts[1] + counts[2] + 4 * counts[3] + counts[4]) % COLUMNS, 0);
+        assert_eq!(counts, [3, 7, 6, 1, 2]);
+        assert_eq!((counts[0] + counts[1] + counts[2] + 6 * counts[3] + counts[4]) % COLUMNS, 0);
         assert_eq!(CHARACTERS.len() as u32 % COLUMNS, 0);
     }
 }

@@ -1,6 +1,7 @@
 //! `rubor import`: other files to a head.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use clap::{Subcommand, ValueEnum};
 use rubor_assets::export::gltf::MapEncodings;
@@ -10,6 +11,7 @@ use rubor_rig::head::Head;
 use rubor_rig::timeline::Sequence;
 
 use crate::failure::{Failure, Outcome};
+use crate::progress::Progress;
 
 #[derive(clap::Args)]
 #[group(skip)]
@@ -231,7 +233,10 @@ pub(crate) fn finish_with(
         options.seed = common.seed.unwrap_or(options.seed);
         options.resolution = common.maps;
         options.melanin = common.melanin.unwrap_or(options.melanin);
-        synthesize::synthesize_into(&mut head, &options).map_err(Failure::input)?;
+        let progress = Mutex::new(Progress::new("rows of maps", options.steps()));
+        let step = || progress.lock().unwrap_or_else(PoisonError::into_inner).step();
+        synthesize::synthesize_into_with(&mut head, &options, &step).map_err(Failure::input)?;
+        progress.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
     }
     let options = export::gltf::Options {
         color_map_size: if common.small { 1024 } else { 2048 },

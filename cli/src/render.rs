@@ -16,7 +16,7 @@ pub(crate) struct Arguments {
     /// Sequence (.json) [default: the demo]
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
-    /// Light instead of the sequence's: three-point, window, backlit-ear, low-key, or a sequence file to take it from
+    /// Light instead of the sequence's: three-point, window, backlit-ear, low-key, soft-box, sky, or a sequence file to take it from
     #[arg(long, value_name = "NAME|FILE")]
     lights: Option<String>,
     #[command(flatten)]

@@ -135,9 +135,9 @@ impl Studio {
         if self.environments.contains_key(&key) {
             return Ok(());
         }
-        let map = match state.name.as_str() {
-            "studio" => EnvironmentMap::studio(),
-            path => load_map(path)?,
+        let map = match EnvironmentMap::named(&state.name) {
+            Some(map) => map,
+            None => load_map(&state.name)?,
         };
         let environment = map.rotated(state.rotation_y.to_degrees()).upload(self.renderer.gpu());
         self.environments.insert(key, environment);
@@ -152,9 +152,10 @@ fn key(state: &EnvironmentState) -> String {
 
 fn load_map(path: &str) -> Outcome<EnvironmentMap> {
     let wrong = |e: &dyn std::fmt::Display| {
-        Failure::input(format!("environment {path:?}: {e}")).hint(
-            "built in is \"studio\"; anything else is the path of an equirectangular .hdr or .exr image",
-        )
+        let names = EnvironmentMap::NAMES.map(|n| format!("{n:?}")).join(", ");
+        Failure::input(format!("environment {path:?}: {e}")).hint(&format!(
+            "built in are {names}; anything else is the path of an equirectangular .hdr or .exr image"
+        ))
     };
     if !std::path::Path::new(path).is_file() {
         return Err(wrong(&"no such file, and no built-in environment of that name"));

@@ -74,6 +74,66 @@ impl EnvironmentMap {
         })
     }
 
+    /// A room lit by one soft box: a large panel above in front, dim warm walls that are darker towards the floor, a pale
+    /// ceiling. The brightness of the panel is 5; the mean over the sphere about 0.4.
+    pub fn soft_box() -> Self {
+        Self::from_fn(256, 128, |d| {
+            // Where the direction meets the plane of the panel, 1 in front of the head along its axis.
+            let axis = Vec3::new(0.0, 0.62, 0.785).normalize();
+            let across = Vec3::X;
+            let up = axis.cross(across);
+            let ahead = d.dot(axis);
+            let panel = if ahead > 0.05 {
+                let soft = |x: f32, half: f32| 1.0 - ((x.abs() - half) / 0.10).clamp(0.0, 1.0);
+                soft(d.dot(across) / ahead, 0.62) * soft(d.dot(up) / ahead, 0.36)
+            } else {
+                0.0
+            };
+            let height = 0.5 + 0.5 * d.y;
+            let room = Vec3::new(0.9, 0.84, 0.76).lerp(Vec3::new(0.98, 0.98, 1.0), height);
+            room * (0.06 + 0.20 * height * height) + Vec3::new(1.0, 0.97, 0.92) * 5.0 * panel
+        })
+    }
+
+    /// Clear sky: a sun at 38 degrees in front on the left of someone who looks at the face, blue that pales towards the
+    /// horizon and about the sun, and sunlit ground.
+    ///
+    /// The sun's disc is what eyes mirror: it has a radius of 5 degrees in place of a quarter, and only a third of the
+    /// sky's light, for a map casts no shadows. A directional light along (0.506, -0.616, -0.604) is the rest of it.
+    /// The mean over the sphere is about 0.5.
+    pub fn sky() -> Self {
+        const SUN_RADIUS: f32 = 5.0 * PI / 180.0;
+        let (elevation, azimuth) = (38.0f32.to_radians(), -40.0f32.to_radians());
+        let sun =
+            Vec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
+        Self::from_fn(256, 128, move |d| {
+            let angle = d.dot(sun).clamp(-1.0, 1.0).acos();
+            let disc = 1.0 - ((angle - SUN_RADIUS) / 0.03).clamp(0.0, 1.0);
+            let light = Vec3::new(1.0, 0.92, 0.80) * 32.0 * disc;
+            if d.y < 0.0 {
+                let near = Vec3::new(0.34, 0.31, 0.26) * (0.75 + 0.25 * -d.y);
+                return near.lerp(Vec3::new(0.50, 0.53, 0.56), (1.0 + d.y * 6.0).clamp(0.0, 1.0));
+            }
+            let pale = (-d.y * 3.2).exp();
+            let blue = Vec3::new(0.16, 0.30, 0.62).lerp(Vec3::new(0.62, 0.72, 0.84), pale);
+            let glow = Vec3::new(1.0, 0.9, 0.72) * 0.9 * (-angle * 4.0).exp();
+            blue + glow + light
+        })
+    }
+
+    /// A built-in environment by its name, one of [`EnvironmentMap::NAMES`].
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "studio" => Some(Self::studio()),
+            "soft-box" => Some(Self::soft_box()),
+            "sky" => Some(Self::sky()),
+            _ => None,
+        }
+    }
+
+    /// Names of the built-in environments.
+    pub const NAMES: [&str; 3] = ["studio", "soft-box", "sky"];
+
     /// The map turned about +Y by an angle in degrees; positive turns the surroundings to the left of someone who
     /// looks along -Z.
     pub fn rotated(&self, degrees: f32) -> Self {
@@ -225,6 +285,36 @@ mod tests {
             }
             assert!(irradiance_over_pi(&c, n).abs_diff_eq(direct, 2e-3), "{n}");
         }
+    }
+
+    #[test]
+    fn built_in_environments_are_finite_and_light_a_face_from_in_front_and_above() {
+        for name in EnvironmentMap::NAMES {
+            let map = EnvironmentMap::named(name).unwrap();
+            assert!(map.texels.iter().all(|t| t.is_finite() && t.min_element() >= 0.0), "{name}");
+            let c = map.irradiance_harmonics();
+            let light = |n: Vec3| irradiance_over_pi(&c, n).dot(Vec3::new(0.2126, 0.7152, 0.0722));
+            let front = light(Vec3::new(0.0, 0.5, 0.866));
+            assert!(front > 1.5 * light(-Vec3::Y), "{name}");
+            assert!((0.2..3.0).contains(&front), "{name}: {front}");
+            let mean = c[0];
+            assert!((0.15..1.2).contains(&mean.dot(Vec3::splat(1.0 / 3.0))), "{name}: {mean}");
+        }
+        assert!(EnvironmentMap::named("nowhere").is_none());
+    }
+
+    #[test]
+    fn the_disc_of_the_sun_has_a_third_of_the_light_of_its_sky() {
+        let map = EnvironmentMap::sky();
+        let (mut sun, mut sky) = (0.0, 0.0);
+        for y in 0..map.height / 2 {
+            for x in 0..map.width {
+                let d = direction((x as f32 + 0.5) / 256.0, (y as f32 + 0.5) / 128.0);
+                let t = map.texels[(y * map.width + x) as usize].y * map.solid_angle(y) * d.y;
+                if map.texels[(y * map.width + x) as usize].y > 5.0 { sun += t } else { sky += t }
+            }
+        }
+        assert!((0.2..0.6).contains(&(sun / sky)), "{sun} to {sky}");
     }
 
     #[test]

@@ -14,9 +14,10 @@ use crate::pass_timer::{FrameLog, FrameTimes, PassTimer};
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::{Appearance, AppearanceMethods, Blended, ColorMethod};
 use crate::passes::compose::Compose;
+use crate::passes::cropped_hair::CroppedHair;
 use crate::passes::display::Display;
 use crate::passes::morph::Morph;
-use crate::passes::overlay::Overlay;
+use crate::passes::overlay::{Overlaid, Overlay};
 use crate::passes::scatter::surface::{self, Skin, Surface};
 use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
 use crate::passes::shade::{GpuLight, Lighting, Shade, Shaded, TransmitMethod, Transmittance};
@@ -109,6 +110,7 @@ pub struct Renderer {
     shade: Shade,
     scatter: Scatter,
     compose: Compose,
+    cropped_hair: CroppedHair,
     overlay: Overlay,
     display: Display,
     velocity: Velocity,
@@ -161,6 +163,7 @@ impl Renderer {
             shade: Shade::new(&gpu),
             scatter: Scatter::default(),
             compose: Compose::new(&gpu),
+            cropped_hair: CroppedHair::new(&gpu),
             overlay: Overlay::new(&gpu),
             display: Display::new(&gpu),
             velocity: Velocity::new(&gpu),
@@ -315,6 +318,20 @@ impl Renderer {
         Ok(halves.into_iter().map(|t| t.map(half::f16::to_f32)).collect())
     }
 
+    /// Motion of each pixel since the previous frame in pixels, x right, y down; rows from the top. Empty unless the
+    /// last frame kept a history.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_velocity(&self) -> Result<Vec<[f32; 2]>, RenderError> {
+        let Some(velocity) = self.targets.as_ref().and_then(|t| t.velocity.as_ref()) else {
+            return Ok(Vec::new());
+        };
+        let bytes = self.gpu.read_texture(velocity.texture())?;
+        let halves: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(halves.into_iter().map(|t| [t[0].to_f32(), t[1].to_f32()]).collect())
+    }
+
     /// Normal and tangent (w = sign of the bitangent) of each vertex of the first head of the last frame, world space.
     ///
     /// # Errors
@@ -408,7 +425,7 @@ impl Renderer {
             }
             let numbers = [&head.state.shapes, &head.state.zones, &head.state.distributions];
             if numbers.iter().any(|n| n.iter().any(|w| !w.is_finite()))
-                || !head.state.hemoglobin_scale.is_finite()
+                || !(head.state.hemoglobin_scale + head.state.pupil_mm).is_finite()
             {
                 return limit("face state", "a weight that is not finite".into(), "finite weights".into());
             }
@@ -559,32 +576,52 @@ impl Renderer {
 
             let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
             self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
-            let overlays: Vec<_> = heads
+            let ambient = average_light(scene);
+            let haired: Vec<_> = heads
                 .iter()
-                .filter(|(h, _)| h.overlay_triangles > 0)
+                .filter(|(h, _)| h.hair_root_count > 0)
                 .map(|(h, i)| (*h, &i.positions, &i.frames))
                 .collect();
-            if !overlays.is_empty() {
-                let ambient = average_light(scene);
-                let images = [&sample.depth, &targets.hdr];
-                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images);
+            if !haired.is_empty() {
+                let images = [&targets.irradiance, &sample.depth, &targets.hdr];
+                self.cropped_hair.record(gpu, encoder, timer, &view, ambient, &haired, images);
             }
-
-            let (exposure, samples) = (settings.exposure, settings.supersampling);
-            self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
-            if let Some(velocity) = targets.velocity.as_ref().filter(|_| std::ptr::eq(sample, first)) {
-                // The first frame has nothing before it: its positions stand for the previous ones.
-                let known = self.past.clip_from_world.is_some();
+            // The first frame has nothing before it: its positions stand for the previous ones.
+            let known = self.past.clip_from_world.is_some();
+            let previous =
+                |i: &'_ Instance| if known { i.previous_positions.clone() } else { i.positions.clone() };
+            let previous_positions: Vec<wgpu::Buffer> = heads.iter().map(|(_, i)| previous(i)).collect();
+            let velocity = targets.velocity.as_ref().filter(|_| std::ptr::eq(sample, first));
+            if let Some(velocity) = velocity {
                 let moving: Vec<_> = heads
                     .iter()
-                    .map(|(head, i)| Moving {
+                    .zip(&previous_positions)
+                    .map(|((head, i), previous_positions)| Moving {
                         head,
                         positions: &i.positions,
-                        previous_positions: if known { &i.previous_positions } else { &i.positions },
+                        previous_positions,
                     })
                     .collect();
                 self.velocity.record(gpu, encoder, timer, &view, &moving, &sample.ids, velocity);
             }
+            let overlays: Vec<_> = heads
+                .iter()
+                .zip(&previous_positions)
+                .filter(|((head, _), _)| head.overlay_triangles > 0)
+                .map(|((head, i), previous_positions)| Overlaid {
+                    head,
+                    positions: &i.positions,
+                    previous_positions,
+                    frames: &i.frames,
+                })
+                .collect();
+            if !overlays.is_empty() {
+                let images = [&sample.depth, &targets.hdr];
+                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images, velocity);
+            }
+
+            let (exposure, samples) = (settings.exposure, settings.supersampling);
+            self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
         }
 
         if let Some(antialias) = &self.antialias {
@@ -718,6 +755,7 @@ fn shaded<'a>(
             ColorMethod::Hemoglobin => instance.state.hemoglobin_scale,
         },
         wrinkles: appearance.wrinkles,
+        pupil_mm: instance.state.pupil_mm,
     }
 }
 

@@ -11,6 +11,7 @@ use crate::clusters::{Cluster, clusters};
 use crate::error::RenderError;
 use crate::footprint::mask_size;
 use crate::gpu::Gpu;
+use crate::passes::cropped_hair;
 use crate::texture::{self, Texel};
 
 /// Largest melanin fraction of the skin colour table (papers/004 table 7.1).
@@ -63,6 +64,8 @@ pub struct HeadOnGpu {
     pub(crate) triangles: wgpu::Buffer,
     pub(crate) ring_starts: wgpu::Buffer,
     pub(crate) ring: wgpu::Buffer,
+    pub(crate) hair_roots: wgpu::Buffer,
+    pub(crate) hair_root_count: u32,
     pub(crate) maps: Option<MapsOnGpu>,
     pub(crate) skin_color: wgpu::TextureView,
     pub(crate) bounds: (Vec3, Vec3),
@@ -124,6 +127,7 @@ impl HeadOnGpu {
         let opaque_points: Vec<u32> = corners.map(|v| mesh.vertices[*v as usize].point).collect();
         let (ring_starts, ring) = rings(head, &triangles);
         let maps = upload_maps(gpu, head);
+        let hair_roots = cropped_hair::roots(head, &triangles);
         let texels = color.texels.iter().map(|c| [c[0], c[1], c[2], 1.0]).collect();
         let skin_color =
             texture::upload_half(gpu, "skin colour", [color.width, color.height], &[vec![texels]]);
@@ -142,6 +146,8 @@ impl HeadOnGpu {
             triangles: gpu.storage("triangles", &triangles),
             ring_starts: gpu.storage("ring starts", &ring_starts),
             ring: gpu.storage("rings", &ring),
+            hair_roots: gpu.storage("hair roots", &hair_roots),
+            hair_root_count: hair_roots.len() as u32,
             maps,
             skin_color,
             bounds,
@@ -166,6 +172,7 @@ impl HeadOnGpu {
             &self.triangles,
             &self.ring_starts,
             &self.ring,
+            &self.hair_roots,
             &self.opaque_points,
         ];
         buffers.iter().map(|b| b.size()).sum::<u64>() + self.map_bytes()

@@ -65,7 +65,9 @@ impl Targets {
         Self {
             size,
             samples,
-            velocity: mode.is_temporal().then(|| light("velocity")),
+            velocity: mode
+                .is_temporal()
+                .then(|| view("velocity", size, Rgba16Float, storage | Use::RENDER_ATTACHMENT)),
             image: gpu.target(
                 "image",
                 settings.size,

@@ -205,6 +205,7 @@ impl BoundRig {
             zones,
             distributions,
             hemoglobin_scale: scale.max(0.0),
+            pupil_mm: crate::life::CALM_PUPIL_MM,
             head_rotation: glam::Quat::IDENTITY,
             head_translation: glam::Vec3::ZERO,
         }

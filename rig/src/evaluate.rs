@@ -5,7 +5,7 @@
 //! let shape = |name: &str| BlendShape { name: name.into(), ..BlendShape::default() };
 //! let head = Head { shapes: vec![shape("jawOpen"), shape("browInnerUp")], ..Head::default() };
 //! let (evaluator, notes) = Evaluator::new(&head, &Rig::default_rig().unwrap(), &Sequence::demo().unwrap()).unwrap();
-//! assert_eq!(evaluator.frame_count(), 288);
+//! assert_eq!(evaluator.frame_count(), 480);
 //! let surprised = evaluator.at(2.6).face;
 //! assert!(surprised.shapes[0] > 0.4 && surprised.shapes[1] > 0.8);
 //! assert!(!notes.is_empty()); // this head lacks nearly everything
@@ -20,6 +20,7 @@ use crate::face_state::FaceState;
 use crate::framing::FaceFrame;
 use crate::head::Head;
 use crate::json::steps;
+use crate::life::CALM_PUPIL_MM;
 use crate::names::{Target, nearest};
 use crate::timeline::{LightKind, Sequence, Track};
 
@@ -91,7 +92,27 @@ pub struct Evaluator {
     expressions: Vec<(usize, Track<f32>)>,
     states: Vec<(usize, Track<f32>)>,
     shapes: Vec<(Vec<Target>, Track<f32>)>,
+    /// What gaze, blinks and breath move, in the order of [`LIVING_SHAPES`].
+    living: Vec<Vec<Target>>,
 }
+
+/// Shapes that [`crate::life`] moves.
+const LIVING_SHAPES: [&str; 12] = [
+    "eyeBlinkLeft",
+    "eyeBlinkRight",
+    "eyeLookOutLeft",
+    "eyeLookInRight",
+    "eyeLookInLeft",
+    "eyeLookOutRight",
+    "eyeLookDownLeft",
+    "eyeLookDownRight",
+    "eyeLookUpLeft",
+    "eyeLookUpRight",
+    "noseSneerLeft",
+    "noseSneerRight",
+];
+/// Turn of an eye by `eyeLook*` at weight 1, degrees: about what heads for ARKit are made with.
+const LOOK_DEGREES: f32 = 30.0;
 
 impl Evaluator {
     /// Resolves all names once. Notes tell what has no effect on this head.
@@ -135,6 +156,14 @@ impl Evaluator {
             }
         }
         notes.append(&mut binder.notes);
+        let mut living = Vec::new();
+        if sequence.eyes.is_some() || sequence.life.is_some() {
+            // What a head has no shape for stays still; that is no fault of the sequence, so notes go unsaid.
+            let mut binder = Binder::new(head, source);
+            for name in LIVING_SHAPES {
+                living.push(binder.shape(name, &[], true)?);
+            }
+        }
         if let Some(capture) = &sequence.capture {
             let message = format!("the recording {:?} was not loaded: it has no effect", capture.file);
             notes.push(Note { place: source.place_of_key(&steps!["capture"]), message, nearest: None });
@@ -161,6 +190,7 @@ impl Evaluator {
             expressions,
             states,
             shapes,
+            living,
         };
         Ok((evaluator, notes))
     }
@@ -217,16 +247,34 @@ impl Evaluator {
                 weights.shapes[target.index as usize] += weight * target.factor;
             }
         }
+        let eyes = self.sequence.eyes.as_ref();
+        let motion = self.sequence.life.as_ref().map(|life| life.at(time_s)).unwrap_or_default();
+        let [mut yaw, mut pitch] = motion.gaze_degrees;
+        if let Some(eyes) = eyes {
+            yaw += eyes.yaw_degrees.at(time_s);
+            pitch += eyes.pitch_degrees.at(time_s);
+        }
+        let [left, right, down, up] = [yaw, -yaw, pitch, -pitch].map(|d| (d / LOOK_DEGREES).max(0.0));
+        let ([blink_left, blink_right], nostrils) = (motion.blink, motion.nostrils);
+        let living =
+            [blink_left, blink_right, left, left, right, right, down, down, up, up, nostrils, nostrils];
+        for (targets, weight) in self.living.iter().zip(living) {
+            for target in targets {
+                weights.shapes[target.index as usize] += weight * target.factor;
+            }
+        }
         let head = &self.sequence.head;
-        let radians = |track: &Track<f32>| track.at(time_s).to_radians();
+        let sum = |track: &Track<f32>, more: f32| (track.at(time_s) + more).to_radians();
+        let [head_yaw, head_pitch, head_roll] = motion.head_degrees;
         FaceState {
             head_rotation: Quat::from_euler(
                 EulerRot::YXZ,
-                radians(&head.yaw_degrees),
-                radians(&head.pitch_degrees),
-                radians(&head.roll_degrees),
+                sum(&head.yaw_degrees, head_yaw),
+                sum(&head.pitch_degrees, head_pitch),
+                sum(&head.roll_degrees, head_roll),
             ),
-            head_translation: Vec3::from(head.translation.at(time_s)),
+            head_translation: Vec3::from(head.translation.at(time_s)) + Vec3::from(motion.translation),
+            pupil_mm: eyes.map_or(CALM_PUPIL_MM, |eyes| eyes.pupil_mm.at(time_s)),
             ..self.rig.face(&weights)
         }
     }

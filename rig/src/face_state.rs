@@ -3,6 +3,7 @@
 use glam::{Quat, Vec3};
 
 use crate::head::Head;
+use crate::life::CALM_PUPIL_MM;
 
 /// Weights of one moment, resolved against one head. Names are gone: everything is an index into the head.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +16,8 @@ pub struct FaceState {
     pub distributions: Vec<f32>,
     /// Global factor of hemoglobin (papers/004 section 7.7: 1.27 for anger, 0.81 for fear); 1 is neutral.
     pub hemoglobin_scale: f32,
+    /// Diameter of the pupils, millimetres.
+    pub pupil_mm: f32,
     /// Rotation of the head about the origin of its space: where the skull rests on the neck.
     pub head_rotation: Quat,
     /// Translation after the rotation, metres.
@@ -29,6 +32,7 @@ impl FaceState {
             zones: vec![0.0; head.maps.zones.len()],
             distributions: vec![0.0; head.maps.distributions.len()],
             hemoglobin_scale: 1.0,
+            pupil_mm: CALM_PUPIL_MM,
             head_rotation: Quat::IDENTITY,
             head_translation: Vec3::ZERO,
         }

@@ -32,6 +32,7 @@ pub mod head;
 pub mod hemoglobin;
 pub mod json;
 pub mod landmarks;
+pub mod life;
 pub mod lights;
 pub mod map;
 pub mod mask;

@@ -7,11 +7,13 @@ use crate::error::RigError;
 use crate::timeline::Sequence;
 
 /// Names and texts of the built-in rigs, comments included.
-pub const LIGHT_RIGS: [(&str, &str); 4] = [
+pub const LIGHT_RIGS: [(&str, &str); 6] = [
     ("three-point", include_str!("lights/three-point.json")),
     ("window", include_str!("lights/window.json")),
     ("backlit-ear", include_str!("lights/backlit-ear.json")),
     ("low-key", include_str!("lights/low-key.json")),
+    ("soft-box", include_str!("lights/soft-box.json")),
+    ("sky", include_str!("lights/sky.json")),
 ];
 
 /// The built-in rig of a name; `None` if there is none.

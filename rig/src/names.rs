@@ -159,6 +159,69 @@ const ACTION_UNITS: [(&str, &[&str]); 58] = [
     ("mouthRight", &[]),
 ];
 
+/// Presets of VRM 1.0 avatars (VRMC_vrm, `expressions.preset`) as ARKit shapes. Blinks and looks are defined by VRM;
+/// the shares of vowels and moods are ours, judged by eye: VRM leaves their shape to each avatar.
+pub const VRM_PRESETS: [(&str, &[(&str, f32)]); 17] = [
+    ("blink", &[("eyeBlinkLeft", 1.0), ("eyeBlinkRight", 1.0)]),
+    ("blinkLeft", &[("eyeBlinkLeft", 1.0)]),
+    ("blinkRight", &[("eyeBlinkRight", 1.0)]),
+    ("lookUp", &[("eyeLookUpLeft", 1.0), ("eyeLookUpRight", 1.0)]),
+    ("lookDown", &[("eyeLookDownLeft", 1.0), ("eyeLookDownRight", 1.0)]),
+    ("lookLeft", &[("eyeLookOutLeft", 1.0), ("eyeLookInRight", 1.0)]),
+    ("lookRight", &[("eyeLookInLeft", 1.0), ("eyeLookOutRight", 1.0)]),
+    ("aa", &[("jawOpen", 0.6)]),
+    ("ih", &[("jawOpen", 0.15), ("mouthStretchLeft", 0.5), ("mouthStretchRight", 0.5)]),
+    ("ou", &[("jawOpen", 0.15), ("mouthPucker", 0.8)]),
+    ("ee", &[("jawOpen", 0.2), ("mouthSmileLeft", 0.4), ("mouthSmileRight", 0.4)]),
+    ("oh", &[("jawOpen", 0.35), ("mouthFunnel", 0.8)]),
+    (
+        "happy",
+        &[
+            ("mouthSmileLeft", 0.8),
+            ("mouthSmileRight", 0.8),
+            ("cheekSquintLeft", 0.6),
+            ("cheekSquintRight", 0.6),
+        ],
+    ),
+    (
+        "angry",
+        &[("browDownLeft", 1.0), ("browDownRight", 1.0), ("noseSneerLeft", 0.4), ("noseSneerRight", 0.4)],
+    ),
+    ("sad", &[("browInnerUp", 0.7), ("mouthFrownLeft", 0.7), ("mouthFrownRight", 0.7)]),
+    (
+        "relaxed",
+        &[("mouthSmileLeft", 0.3), ("mouthSmileRight", 0.3), ("eyeSquintLeft", 0.3), ("eyeSquintRight", 0.3)],
+    ),
+    ("surprised", &[("browInnerUp", 0.8), ("eyeWideLeft", 0.8), ("eyeWideRight", 0.8), ("jawOpen", 0.4)]),
+];
+
+/// What an ARKit shape drives on a head that has only VRM presets, and its share.
+const ON_VRM_HEADS: [(&str, &str, f32); 17] = [
+    ("eyeBlinkLeft", "blinkLeft", 1.0),
+    ("eyeBlinkRight", "blinkRight", 1.0),
+    ("eyeBlinkLeft", "blink", 0.5),
+    ("eyeBlinkRight", "blink", 0.5),
+    ("eyeLookUpLeft", "lookUp", 0.5),
+    ("eyeLookUpRight", "lookUp", 0.5),
+    ("eyeLookDownLeft", "lookDown", 0.5),
+    ("eyeLookDownRight", "lookDown", 0.5),
+    ("eyeLookOutLeft", "lookLeft", 0.5),
+    ("eyeLookInRight", "lookLeft", 0.5),
+    ("eyeLookInLeft", "lookRight", 0.5),
+    ("eyeLookOutRight", "lookRight", 0.5),
+    ("jawOpen", "aa", 1.0),
+    ("mouthPucker", "ou", 1.0),
+    ("mouthFunnel", "oh", 1.0),
+    ("mouthStretchLeft", "ih", 0.5),
+    ("mouthStretchRight", "ih", 0.5),
+];
+
+/// The VRM preset of a name in any spelling.
+fn vrm_preset(written: &str) -> Option<&'static (&'static str, &'static [(&'static str, f32)])> {
+    let key = Key::new(written);
+    VRM_PRESETS.iter().find(|(name, _)| Key::new(name) == key)
+}
+
 /// Half of the face, the character's own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Side {
@@ -246,7 +309,7 @@ pub fn vocabulary() -> impl Iterator<Item = &'static str> {
 
 /// True for a name that [`canonical`] knows, or that is both halves of one: `eyeBlink`, `cheekRaiser`.
 pub fn is_known_shape(written: &str) -> bool {
-    if canonical(written).is_some() {
+    if canonical(written).is_some() || vrm_preset(written).is_some() {
         return true;
     }
     let key = Key::new(written);
@@ -296,8 +359,32 @@ impl Resolver {
     /// 1. the exact name,
     /// 2. the same name in another spelling,
     /// 3. both halves, for a name without a side (`browInnerUp` on a head with `browInnerUp_L` and `_R`),
-    /// 4. the undivided shape at half the weight, for a half (`cheekPuffLeft` on a head with `cheekPuff`).
+    /// 4. the undivided shape at half the weight, for a half (`cheekPuffLeft` on a head with `cheekPuff`),
+    /// 5. the ARKit shapes of a VRM preset, and the presets of a VRM head for an ARKit shape.
     pub fn resolve(&self, written: &str) -> Vec<Target> {
+        let targets = self.resolve_name(written);
+        if !targets.is_empty() {
+            return targets;
+        }
+        if let Some((_, shapes)) = vrm_preset(written) {
+            let scaled = |(shape, share): &(&str, f32)| {
+                let share = *share;
+                self.resolve_name(shape).into_iter().map(move |t| Target { factor: share * t.factor, ..t })
+            };
+            return shapes.iter().flat_map(scaled).collect();
+        }
+        let Some(shape) = canonical(written) else { return Vec::new() };
+        let presets = ON_VRM_HEADS.iter().filter(|(name, ..)| *name == shape);
+        let whole = |(_, preset, share): &(&str, &str, f32)| {
+            let key = Key::new(preset);
+            let index = self.keys.iter().position(|k| *k == key)?;
+            Some(Target { index: index as u32, factor: *share })
+        };
+        // The first is the closer one: `blink` only where there is no `blinkLeft`.
+        presets.filter_map(whole).take(1).collect()
+    }
+
+    fn resolve_name(&self, written: &str) -> Vec<Target> {
         let whole = |index: usize| Target { index: index as u32, factor: 1.0 };
         if let Some(index) = self.names.iter().position(|n| n == written) {
             return vec![whole(index)];
@@ -545,6 +632,27 @@ mod tests {
         assert!(is_known_shape("cheekRaiser"));
         assert!(is_known_shape("EyeBlink"));
         assert!(!is_known_shape("eyeBlinks"));
+    }
+
+    #[test]
+    fn vrm_presets_meet_arkit_shapes_in_both_directions() {
+        let arkit = Resolver::new(ARKIT);
+        for (preset, shapes) in VRM_PRESETS {
+            assert!(shapes.iter().all(|(name, share)| ARKIT.contains(name) && (0.0..=1.0).contains(share)));
+            assert_eq!(arkit.resolve(preset).len(), shapes.len(), "{preset}");
+            assert!(is_known_shape(preset) && canonical(preset).is_none(), "{preset}");
+        }
+        assert_eq!(resolved(&arkit, "Blink_L"), [("eyeBlinkLeft".to_owned(), 1.0)]);
+        let vrm = Resolver::new(VRM_PRESETS.map(|(name, _)| name));
+        assert_eq!(resolved(&vrm, "eyeBlinkLeft"), [("blinkLeft".to_owned(), 1.0)]);
+        assert_eq!(resolved(&vrm, "jawOpen"), [("aa".to_owned(), 1.0)]);
+        assert_eq!(resolved(&vrm, "eyeLookInRight"), [("lookLeft".to_owned(), 0.5)]);
+        assert!(vrm.resolve("noseSneerLeft").is_empty());
+        // VRM 0 avatars often have one blink.
+        let one = Resolver::new(["Blink"]);
+        assert_eq!(resolved(&one, "eyeBlinkRight"), [("Blink".to_owned(), 0.5)]);
+        // Zones and distributions have names of their own.
+        assert!(Resolver::new(["joy", "forehead"]).resolve("happy").is_empty());
     }
 
     #[test]

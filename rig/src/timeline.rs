@@ -28,6 +28,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::error::RigError;
 use crate::json::{self, Source, Step, steps};
+use crate::life::{Eyes, Life};
 
 /// A performance, its camera and its lights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -65,6 +66,12 @@ pub struct Sequence {
     /// Motion of the head as a whole.
     #[serde(default)]
     pub head: HeadMotion,
+    /// Where the eyes look, and their pupils.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eyes: Option<Eyes>,
+    /// Blinks, saccades, breath and sway that nobody keys.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub life: Option<Life>,
     /// Camera.
     #[serde(default)]
     pub camera: Camera,
@@ -562,6 +569,8 @@ impl Sequence {
             shapes: BTreeMap::new(),
             capture: None,
             head: HeadMotion::default(),
+            eyes: None,
+            life: None,
             camera: Camera::default(),
             lights: Vec::new(),
             environment: None,
@@ -611,6 +620,7 @@ impl Sequence {
         for (name, track) in &self.shapes {
             self.check_track(&steps!["shapes", name], track, any)?;
         }
+        self.check_life()?;
         if let Some(capture) = &self.capture {
             if !(capture.start >= 0.0 && capture.start <= LONGEST_S) {
                 let expected = "a time in seconds, from 0 to 86400";
@@ -679,6 +689,29 @@ impl Sequence {
         };
         let found = format!("a {kind} light without a {missing}");
         self.wrong(&steps!["lights", i], &found, &format!("the field {missing:?}"))
+    }
+
+    fn check_life(&self) -> Result<(), RigError> {
+        if let Some(eyes) = &self.eyes {
+            let turn = (-45.0, 45.0);
+            self.check_track(&steps!["eyes", "yawDegrees"], &eyes.yaw_degrees, turn)?;
+            self.check_track(&steps!["eyes", "pitchDegrees"], &eyes.pitch_degrees, turn)?;
+            self.check_track(&steps!["eyes", "pupilMm"], &eyes.pupil_mm, (1.5, 9.0))?;
+        }
+        let Some(life) = &self.life else { return Ok(()) };
+        // Written so that NaN fails.
+        if !(life.blinks >= 0.0 && life.blinks <= 4.0) {
+            return self.wrong(&steps!["life", "blinks"], &life.blinks.to_string(), "a number from 0 to 4");
+        }
+        let breaths = life.breaths_per_minute;
+        if !(4.0..=60.0).contains(&breaths) {
+            let expected = "breaths a minute, 4 to 60";
+            return self.wrong(&steps!["life", "breathsPerMinute"], &breaths.to_string(), expected);
+        }
+        let factor = (0.0, 5.0);
+        self.check_track(&steps!["life", "saccades"], &life.saccades, factor)?;
+        self.check_track(&steps!["life", "breathing"], &life.breathing, factor)?;
+        self.check_track(&steps!["life", "sway"], &life.sway, factor)
     }
 
     fn check_optional<T: TrackValue>(

@@ -533,8 +533,8 @@ fn the_demo_shows_what_it_promises() {
     let (rig, mut demo) = (Rig::default_rig().unwrap(), Sequence::demo().unwrap());
     demo.fps = 4.0; // the slowest that the command renders it at
     let (evaluator, _) = Evaluator::new(&head, &rig, &demo).unwrap();
-    assert_eq!(evaluator.frame_count(), 48);
-    let times: Vec<f64> = (0..48).map(|i| evaluator.frame_time_s(i)).collect();
+    assert_eq!(evaluator.frame_count(), 80);
+    let times: Vec<f64> = (0..80).map(|i| evaluator.frame_time_s(i)).collect();
     let longest_alone = |name: &str| {
         times
             .iter()
@@ -553,13 +553,57 @@ fn the_demo_shows_what_it_promises() {
     assert!(times.iter().any(both));
     let blink = &demo.shapes["eyeBlink"];
     assert!(times.iter().all(|t| blink.at(*t) < 0.05), "a blink falls on a frame");
-    assert!((0..288).any(|i| blink.at(f64::from(i) / 24.0) > 0.95));
+    assert!((0..480).any(|i| blink.at(f64::from(i) / 24.0) > 0.95));
     for t in &times {
         let face = evaluator.at(*t).face;
         assert!(face.shapes.iter().chain(&face.zones).all(|w| (0.0..=1.0).contains(w)));
         assert!(face.distributions.iter().sum::<f32>() <= 1.0 + 1e-6);
         assert!((0.5..1.5).contains(&face.hemoglobin_scale), "{} at {t}", face.hemoglobin_scale);
     }
+}
+
+#[test]
+fn eyes_and_life_move_the_shapes_that_they_name() {
+    let head = arkit_head();
+    let index = |name: &str| head.shapes.iter().position(|s| s.name == name).unwrap();
+    let face = |body: &str, time: f64| {
+        let text = format!(r#"{{ "fps": 24, "duration": 60, {body} }}"#);
+        let sequence = Sequence::from_json("s.json", &text).unwrap();
+        Evaluator::new(&head, &Rig::default(), &sequence).unwrap().0.at(time).face
+    };
+    let still = face("", 3.0);
+    // To the character's left: the left eye turns outwards, the right one inwards. 30 degrees are the whole shape.
+    let left = face(r#""eyes": { "yawDegrees": 15, "pitchDegrees": -6, "pupilMm": 6 }"#, 3.0);
+    for (name, weight) in [
+        ("eyeLookOutLeft", 0.5),
+        ("eyeLookInRight", 0.5),
+        ("eyeLookInLeft", 0.0),
+        ("eyeLookUpLeft", 0.2),
+        ("eyeLookDownRight", 0.0),
+    ] {
+        assert!((left.shapes[index(name)] - weight).abs() < 1e-6, "{name}: {}", left.shapes[index(name)]);
+    }
+    assert_eq!((left.pupil_mm, still.pupil_mm), (6.0, 4.7));
+    // Nothing written, nothing moved.
+    assert_eq!(face(r#""life": {}"#, 3.0), still);
+    let alive = r#""life": { "seed": 3, "blinks": 1, "breathing": 1, "sway": 1 }"#;
+    let blinks = (0..600).map(|i| face_weight(&face(alive, f64::from(i) * 0.1), index("eyeBlinkLeft")));
+    assert!(blinks.fold(0.0f32, f32::max) > 0.9);
+    assert_ne!(face(alive, 3.0).head_translation, still.head_translation);
+    assert_ne!(face(alive, 3.0).head_rotation, still.head_rotation);
+    assert_eq!(face(alive, 3.0), face(alive, 3.0));
+    let wrong = |body: &str| {
+        let text = format!(r#"{{ "fps": 24, "duration": 60, {body} }}"#);
+        Sequence::from_json("s.json", &text).unwrap_err().to_string()
+    };
+    assert!(wrong(r#""eyes": { "pupilMm": 12 }"#).contains("12"));
+    assert!(wrong(r#""life": { "blinks": 9 }"#).contains("from 0 to 4"));
+    assert!(wrong(r#""life": { "breathsPerMinute": 0 }"#).contains("4 to 60"));
+    assert!(wrong(r#""life": { "sway": -1 }"#).contains("-1"));
+}
+
+fn face_weight(face: &rubor_rig::face_state::FaceState, shape: usize) -> f32 {
+    face.shapes[shape]
 }
 
 #[test]

@@ -4,12 +4,14 @@
 //! glTF document --gltf----> broken or missing names, normals, weights of joints
 //! Head ---------head------> sizes, names, shapes without points, maps that change nothing
 //! Head + Rig + Sequence --visibility--> why a wrinkle zone or a distribution does not show
+//! USD layer ------usd-----> units, blend shapes, weights, pictures that are not there
 //! Recording + Retarget --capture--> columns that move nothing
 //! ```
 
 pub mod capture;
 pub mod head;
 pub mod performance;
+pub mod usd;
 pub mod visibility;
 
 use serde::Serialize;

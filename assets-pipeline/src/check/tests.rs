@@ -8,7 +8,8 @@ use rubor_rig::map::Map;
 use rubor_rig::timeline::Sequence;
 
 use super::visibility::{self, Scene};
-use super::{Finding, Severity, capture, head, performance};
+use super::{Finding, Severity, capture, head, performance, usd};
+use crate::export::usd::{Options, to_layer};
 use crate::import::capture::{Retarget, live_link};
 
 /// A square of skin, 0.25 m high, whose zone and distribution show.
@@ -190,4 +191,41 @@ fn columns_that_move_nothing() {
             "1 weights above the limit",
         ],
     );
+}
+
+#[test]
+fn usd_layers_and_what_breaks_them() {
+    let head = good();
+    let rig = Rig::from_json("rig.json", RIG).unwrap();
+    let text = r#"{"fps": 4, "duration": 1, "expressions": {"joy": [{"t": 0, "v": 0}, {"t": 0.5, "v": 1}]}}"#;
+    let sequence = Sequence::from_json("s.json", text).unwrap();
+    let options = Options {
+        color_map_size: 0,
+        normal_map_size: 0,
+        rig: Some(&rig),
+        sequence: Some(&sequence),
+        ..Options::default()
+    };
+    let layer = to_layer(&head, &options, "t").unwrap().text;
+    let check = |text: &str| texts(&usd::check(text.as_bytes(), "/nowhere".as_ref()));
+    assert_eq!(check(&layer), [""; 0], "{layer}");
+    let broken = |from: &str, to: &str, words: &str| {
+        assert!(layer.contains(from), "{from} in {layer}");
+        says(&check(&layer.replacen(from, to, 1)), &[words]);
+    };
+    broken("#usda 1.0", "#usda 2.0", "expected #usda 1.0");
+    broken("metersPerUnit = 1", "", "there is no metersPerUnit");
+    broken("blendShapes = [\"jawOpen\"]", "blendShapes = [\"jawOpne\"]", "write \"jawOpen\"");
+    broken("[\"jawOpen\"]", "[]", "1 weights for 0 shapes");
+    broken("pointIndices = [0]", "pointIndices = [9]", "1 point indices are not below the 4 points");
+    broken("pointIndices = [0]", "pointIndices = [0, 1]", "offsets has 1 entries for 2 points");
+    broken("/Face/jawOpen>", "/Face/jaw>", "/rubor_head/Face/jaw is not there");
+    broken("/Surface.outputs", "/Surfaces.outputs", "Surfaces, which is not there");
+    broken("float inputs:metallic = 0", "asset inputs:file = @../x.png@", "leaves the folder");
+    broken("float inputs:metallic = 0", "asset inputs:file = @x.png@", "there is no file");
+    broken("def Scope", "dif Scope", "expected a property");
+    for cut in (0..layer.len()).step_by(37) {
+        assert!(!check(&layer[..cut]).is_empty() || layer[cut..].trim().is_empty(), "cut at {cut}");
+    }
+    says(&texts(&usd::check(b"PXR-USDC\0", "".as_ref())), &["usdcat"]);
 }

@@ -203,7 +203,8 @@ fn hermite(a: f64, b: f64, slopes: [f64; 2], u: f64) -> f64 {
 /// Keys of a function within `tolerance` of its values; 0 leaves out no authored key.
 ///
 /// Where the function has a kink of slope `s` between two breaks, the error there may be up to `s` / 32768.
-pub fn fit(breaks: &Breaks, f: &dyn Fn(f64) -> Vec<f32>, tolerance: f32) -> Curve {
+/// `only_lines` gives no cubic: more keys, for programs that drop the slopes of cubic keys.
+pub fn fit(breaks: &Breaks, f: &dyn Fn(f64) -> Vec<f32>, tolerance: f32, only_lines: bool) -> Curve {
     let times: Vec<(f64, bool)> = breaks.times.iter().map(|(t, jump)| (f64::from_bits(*t), *jump)).collect();
     let mut pieces: Vec<Piece> =
         times.windows(2).map(|w| Piece::new(f, w[0].0, w[1].0, [w[0].1, w[1].1])).collect();
@@ -222,9 +223,17 @@ pub fn fit(breaks: &Breaks, f: &dyn Fn(f64) -> Vec<f32>, tolerance: f32) -> Curv
                 keys.push(key(time, values));
             }
         }
+        // A last key at the end, so that a player that loops keeps the length.
+        if keys.len() > 1 && keys.last().is_some_and(|k| k.time_s < breaks.end_s as f32) {
+            keys.push(key(breaks.end_s, &end));
+        }
         return Curve { interpolation: Interpolation::Step, keys };
     }
-    if pieces.iter().all(|p| p.is_straight((0.5 * tolerance).max(ROUNDING))) {
+    let straight = (0.5 * tolerance).max(ROUNDING);
+    if only_lines {
+        pieces = halve(f, pieces, &|p| p.is_straight(straight));
+    }
+    if only_lines || pieces.iter().all(|p| p.is_straight(straight)) {
         let pieces = join_lines(&pieces, 0.5 * tolerance);
         let mut keys: Vec<CurveKey> = Vec::new();
         for (first, last) in pieces {
@@ -234,7 +243,7 @@ pub fn fit(breaks: &Breaks, f: &dyn Fn(f64) -> Vec<f32>, tolerance: f32) -> Curv
         finish(&mut keys, breaks.end_s, &end);
         return Curve { interpolation: Interpolation::Linear, keys };
     }
-    pieces = halve(f, pieces, (0.5 * tolerance).max(2.0 * ROUNDING));
+    pieces = halve(f, pieces, &|p| p.fits_cubic((0.5 * tolerance).max(2.0 * ROUNDING)));
     let joined = join_cubics(f, pieces, 0.5 * tolerance);
     let mut keys: Vec<CurveKey> = Vec::new();
     for piece in &joined {
@@ -341,12 +350,12 @@ pub(super) fn kept_frames(values: &[Vec<f32>], tolerance: f32) -> Vec<usize> {
     std::iter::once(0).chain(joined.iter().map(|(_, last)| last.end_s as usize)).collect()
 }
 
-/// Halves pieces until a cubic fits each.
-fn halve(f: &dyn Fn(f64) -> Vec<f32>, pieces: Vec<Piece>, tolerance: f64) -> Vec<Piece> {
+/// Halves pieces until each fits.
+fn halve(f: &dyn Fn(f64) -> Vec<f32>, pieces: Vec<Piece>, fits: &dyn Fn(&Piece) -> bool) -> Vec<Piece> {
     let mut out = Vec::new();
     let mut todo: Vec<Piece> = pieces.into_iter().rev().collect();
     while let Some(piece) = todo.pop() {
-        if piece.length_s() <= SHORTEST_S || piece.fits_cubic(tolerance) {
+        if piece.length_s() <= SHORTEST_S || fits(&piece) {
             out.push(piece);
             continue;
         }
@@ -409,7 +418,7 @@ mod tests {
     fn fitted(tracks: &[Track<f32>], end_s: f64, tolerance: f32) -> Curve {
         let mut breaks = Breaks::new(end_s);
         tracks.iter().for_each(|t| breaks.add(t));
-        fit(&breaks, &|t| tracks.iter().map(|track| track.at(t)).collect(), tolerance)
+        fit(&breaks, &|t| tracks.iter().map(|track| track.at(t)).collect(), tolerance, false)
     }
 
     fn worst(curve: &Curve, tracks: &[Track<f32>], end_s: f64) -> f32 {
@@ -427,7 +436,7 @@ mod tests {
         assert_eq!(curve.interpolation, Interpolation::Step);
         assert_eq!(
             curve.keys.iter().map(|k| (k.time_s, k.values[0])).collect::<Vec<_>>(),
-            [(0.0, 0.0), (0.4, 1.0), (0.7, 0.25)]
+            [(0.0, 0.0), (0.4, 1.0), (0.7, 0.25), (1.0, 0.25)]
         );
         let lines = track(&[(0.25, 0.0, Ease::Linear), (0.5, 1.0, Ease::Linear), (1.0, 0.5, Ease::Linear)]);
         let curve = fitted(std::slice::from_ref(&lines), 1.0, 0.0);
@@ -491,11 +500,25 @@ mod tests {
         let mut breaks = Breaks::new(1.0);
         breaks.add(&rising);
         let clamped = |t: f64| vec![rising.at(t).min(1.3)];
-        let curve = fit(&breaks, &clamped, 1e-5);
+        let curve = fit(&breaks, &clamped, 1e-5, false);
         let error = |t: f64| (curve.at(t as f32)[0] - clamped(t)[0]).abs();
         let worst = (0..=10_000).map(|i| error(f64::from(i) * 1e-4)).fold(0.0, f32::max);
         assert!(worst < 2.0 / 32768.0 + 1e-6, "{worst}");
         assert!(curve.keys.len() < 40, "{}", curve.keys.len());
+    }
+
+    #[test]
+    fn lines_alone_stay_within_the_tolerance() {
+        let tracks = [
+            track(&[(0.0, 0.0, Ease::Smooth), (0.9, 1.0, Ease::Step), (1.7, 0.0, Ease::Linear)]),
+            track(&[(0.2, 0.5, Ease::EaseInOut), (1.5, 1.0, Ease::Linear)]),
+        ];
+        let mut breaks = Breaks::new(2.0);
+        tracks.iter().for_each(|t| breaks.add(t));
+        let curve = fit(&breaks, &|t| tracks.iter().map(|track| track.at(t)).collect(), 1e-3, true);
+        assert_eq!(curve.interpolation, Interpolation::Linear);
+        assert!(worst(&curve, &tracks, 2.0) <= 1.001e-3);
+        assert!((20..90).contains(&curve.keys.len()), "{}", curve.keys.len());
     }
 
     #[test]

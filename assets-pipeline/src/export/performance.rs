@@ -47,7 +47,13 @@ pub(super) struct PerformanceCurves {
 
 impl PerformanceCurves {
     /// `kept`: indices of the shapes that the file will have.
-    pub(super) fn new(evaluator: &Evaluator, kept: &[usize], height_metres: f32, tolerance: f32) -> Self {
+    pub(super) fn new(
+        evaluator: &Evaluator,
+        kept: &[usize],
+        height_metres: f32,
+        tolerance: f32,
+        only_lines: bool,
+    ) -> Self {
         let sequence = evaluator.sequence();
         let face = |t: f64| evaluator.face_at(t);
         let with = |tracks: &[&rubor_rig::timeline::Track<f32>]| {
@@ -67,10 +73,10 @@ impl PerformanceCurves {
         shifting.add(&motion.translation);
         let translation = |t: f64| face(t).head_translation.to_array().to_vec();
         Self {
-            weights: fit(&with(&moving), &weights, tolerance),
+            weights: fit(&with(&moving), &weights, tolerance, only_lines),
             // An angle is four times the change of a component at most, and a head is about as wide as high.
-            rotation: fit(&with(&turning), &rotation, 0.25 * tolerance),
-            translation: fit(&shifting, &translation, tolerance * height_metres),
+            rotation: fit(&with(&turning), &rotation, 0.25 * tolerance, only_lines),
+            translation: fit(&shifting, &translation, tolerance * height_metres, only_lines),
         }
     }
 }

@@ -8,3 +8,4 @@ pub mod materials;
 pub mod obj;
 pub mod obj_set;
 mod tiles;
+pub mod usda;

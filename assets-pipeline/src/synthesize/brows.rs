@@ -74,11 +74,12 @@ impl Hairs {
         if beard > 0.01 {
             clear *= 1.0 - self.cropped(place, 0.95, 0.12, beard);
         }
-        // The edge is ragged at the scale of tufts and thin over a centimetre.
+        // The edge is ragged at the scale of tufts and thins out over two centimetres.
         let height = above_hairline(plan(place))
-            + 1.5 * noise(place, 15.0, self.seed ^ 9)
-            + 1.2 * noise(place, 2.2, self.seed ^ 10);
-        let scalp = self.scalp * smoothstep(-4.0, 10.0, height) * (1.0 - smoothstep(0.9, 1.0, r.ear));
+            + 2.6 * noise(place, 19.0, self.seed ^ 9)
+            + 1.5 * noise(place, 5.0, self.seed ^ 16)
+            + 1.1 * noise(place, 2.2, self.seed ^ 10);
+        let scalp = self.scalp * smoothstep(-7.0, 12.0, height) * (1.0 - smoothstep(0.9, 1.0, r.ear));
         if scalp > 0.01 {
             clear *= 1.0 - self.cropped_strokes(place, scalp);
         }
@@ -98,8 +99,10 @@ impl Hairs {
         let fine = noise(squeezed(7.0), width_mm, self.seed ^ 13);
         let coarse = noise(squeezed(5.0), 0.9, self.seed ^ 14);
         let tufts = noise(place, 6.0, self.seed ^ 15);
-        let strokes = smoothstep(-1.0, 0.9, fine + 0.5 * coarse + 0.2 * tufts + 3.4 * (density - 0.55));
-        (0.78 * density * density + 0.21 * strokes * smoothstep(0.0, 0.5, density)).min(0.98)
+        let strokes = smoothstep(-1.0, 0.9, fine + 0.5 * coarse + 0.1 * tufts + 3.4 * (density - 0.55));
+        // Skin shimmers through what is cropped, unevenly; single hairs are drawn over it.
+        let uneven = 1.0 + 0.05 * noise(place, 14.0, self.seed ^ 17) + 0.03 * tufts;
+        (0.66 * density * density * uneven + 0.24 * strokes * smoothstep(0.0, 0.5, density)).clamp(0.0, 0.92)
     }
 
     /// Cut hairs as dots over a tint.

@@ -8,7 +8,7 @@ use super::noise::{Stream, features, noise, smoothstep, unit};
 use super::regions::{Regions, eye_distance};
 
 /// Standard deviation of hemoglobin about its regional mean, relative to it, on calm skin.
-const HEMOGLOBIN_SPREAD: f32 = 0.14;
+const HEMOGLOBIN_SPREAD: f32 = 0.105;
 
 /// A mole on the plan of the face.
 struct Mole {
@@ -165,10 +165,10 @@ impl Chromophores {
 
     /// Standardised variation of perfusion: capillary mottling and a few vessels, near Gaussian with unit variance.
     pub(crate) fn mottling(&self, place: Vec3, r: &Regions) -> f32 {
-        let octaves = 0.52 * self.noise(place, 6.5, 23)
-            + 0.50 * self.noise(place, 3.0, 24)
-            + 0.46 * self.noise(place, 1.4, 25)
-            + 0.38 * self.noise(place, 0.75, 26);
+        let octaves = 0.34 * self.noise(place, 6.5, 23)
+            + 0.46 * self.noise(place, 3.0, 24)
+            + 0.56 * self.noise(place, 1.4, 25)
+            + 0.48 * self.noise(place, 0.75, 26);
         let vessel_area = 0.06
             + 0.5 * r.nose_wing
             + 0.4 * r.cheek
@@ -182,7 +182,7 @@ impl Chromophores {
             let broken = smoothstep(0.5, 1.3, self.noise(place, 7.5, 29));
             vessels = vessel_area * broken * (-(line / 0.07).powi(2)).exp();
         }
-        octaves / 0.937 + 1.1 * vessels
+        octaves / 0.936 + 1.1 * vessels
     }
 
     /// Relative standard deviation of hemoglobin in a region.

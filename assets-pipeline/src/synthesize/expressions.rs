@@ -40,7 +40,7 @@ const STATES: [State; 9] = [
                 + 0.05 * r.nose_wing
                 - 0.10 * r.under_eye
         },
-        patchiness: 1.15,
+        patchiness: 0.92,
     },
     State {
         name: "surprise",
@@ -139,7 +139,7 @@ const STATES: [State; 9] = [
                 + 0.10 * r.lips
                 - 0.22 * r.upper_lip
         },
-        patchiness: 1.3,
+        patchiness: 1.0,
     },
     State {
         name: "alcohol",
@@ -166,16 +166,16 @@ const STATES: [State; 9] = [
         everywhere: 0.04,
         // Cheeks and ears first, spreading to the neck in blotches.
         change: |r| {
-            0.52 * r.cheek
-                + 0.46 * r.cheek_bone
-                + 0.36 * r.lower_cheek
+            0.46 * r.cheek
+                + 0.36 * r.cheek_bone
+                + 0.24 * r.lower_cheek
                 + 0.55 * r.ear
                 + 0.26 * r.neck
                 + 0.14 * r.forehead
                 + 0.12 * r.nose
                 + 0.10 * r.chin
         },
-        patchiness: 1.15,
+        patchiness: 0.72,
     },
 ];
 

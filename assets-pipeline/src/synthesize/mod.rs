@@ -101,6 +101,15 @@ impl Default for Options {
 }
 
 impl Options {
+    /// How often [`synthesize_into_with`] reports: once for each row of its detailed maps.
+    pub fn steps(&self) -> u64 {
+        u64::from(self.resolution) + u64::from(self.half_resolution())
+    }
+
+    fn half_resolution(&self) -> u32 {
+        (self.resolution / 2).max(*RESOLUTIONS.start())
+    }
+
     /// The seed as the hashes take it.
     fn seed_bits(&self) -> u32 {
         (self.seed ^ (self.seed >> 32)) as u32
@@ -176,6 +185,14 @@ pub enum SynthesizeError {
 /// # Errors
 /// Options out of range, or a head without skin.
 pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, SynthesizeError> {
+    synthesize_with(head, options, &|| ())
+}
+
+fn synthesize_with(
+    head: &Head,
+    options: &Options,
+    step: &(dyn Fn() + Sync),
+) -> Result<SkinMaps, SynthesizeError> {
     options.check()?;
     let space = FaceSpace::fit(head);
     let surface = SkinSurface::new(head, &space);
@@ -187,11 +204,11 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let wrinkles = Wrinkles::new(seed);
     let lasting = lasting_lines(options.age_years);
 
-    let half = surface.rasterise((options.resolution / 2).max(*RESOLUTIONS.start()));
+    let half = surface.rasterise(options.half_resolution());
     let texel_mm = surface.texel_mm(half.resolution());
     let half_relief = Relief::new(seed, texel_mm, options.age_years);
     let half_hairs = Hairs::new(options, texel_mm);
-    let mut broad = half.bake::<5>(&[2, 2, 1], |site| {
+    let mut broad = half.bake_with::<5>(&[2, 2, 1], step, |site| {
         let r = Regions::at(site.place);
         let [x, y] =
             if Wrinkles::reach(site.place) { site.slopes(wrinkles.gradient(site.place)) } else { [0.0; 2] };
@@ -208,7 +225,7 @@ pub fn synthesize(head: &Head, options: &Options) -> Result<SkinMaps, Synthesize
     let texel_mm = surface.texel_mm(options.resolution);
     let relief = Relief::new(seed, texel_mm, options.age_years);
     let hairs = Hairs::new(options, texel_mm);
-    let mut detailed = full.bake::<5>(&[1, 1, 2, 1], |site| {
+    let mut detailed = full.bake_with::<5>(&[1, 1, 2, 1], step, |site| {
         let r = Regions::at(site.place);
         let relief = relief.sample(site, &r);
         let hair = hairs.cover(site.place, &r);
@@ -299,7 +316,19 @@ pub fn provenance(options: &Options) -> Vec<Provenance> {
 /// # Errors
 /// As [`synthesize`]; the head is then unchanged.
 pub fn synthesize_into(head: &mut Head, options: &Options) -> Result<(), SynthesizeError> {
-    head.maps = synthesize(head, options)?;
+    synthesize_into_with(head, options, &|| ())
+}
+
+/// As [`synthesize_into`]; calls `step` [`Options::steps`] times on the way, from several threads.
+///
+/// # Errors
+/// As [`synthesize`]; the head is then unchanged.
+pub fn synthesize_into_with(
+    head: &mut Head,
+    options: &Options,
+    step: &(dyn Fn() + Sync),
+) -> Result<(), SynthesizeError> {
+    head.maps = synthesize_with(head, options, step)?;
     strands::grow_brows(head, options);
     head.provenance.retain(|p| !p.of.starts_with("maps."));
     head.provenance.extend(provenance(options));

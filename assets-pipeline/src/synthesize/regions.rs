@@ -84,13 +84,13 @@ const HAIRLINE: [[f32; 2]; 15] = [
     [48.0, 71.0],
     [64.0, 54.0],
     [70.0, 40.0],
-    [80.0, 28.0],
-    [90.0, 10.0],
-    [99.0, -10.0],
-    [108.0, -22.0],
-    [117.0, -20.0],
-    [128.0, 4.0],
-    [148.0, 10.0],
+    [80.0, 26.0],
+    [90.0, 6.0],
+    [99.0, -14.0],
+    [108.0, -26.0],
+    [117.0, -28.0],
+    [128.0, -10.0],
+    [148.0, -4.0],
     [164.0, -30.0],
     [190.0, -62.0],
     [251.0, -72.0],
@@ -112,9 +112,16 @@ pub(crate) fn eye_distance(p: Vec2) -> (f32, bool) {
     (if beyond > 0.0 && vertical <= 0.0 { beyond } else { distance }, above)
 }
 
-/// Height above the hairline, mm, negative on the face.
+/// Signed distance to the hairline, mm, negative on the face. Where the line is steep, as before the ear, height over it
+/// would be many times the distance.
 pub(crate) fn above_hairline(p: Vec2) -> f32 {
-    p.y - through(&HAIRLINE, p.x.abs())
+    const HALF_STEP_MM: f32 = 7.0;
+    let s = p.x.abs();
+    let at = |s: f32| through(&HAIRLINE, s);
+    // Knots are corners; the mean over a step rounds them.
+    let mean = 0.25 * (at((s - HALF_STEP_MM).abs()) + 2.0 * at(s) + at(s + HALF_STEP_MM));
+    let slope = (at(s + HALF_STEP_MM) - at(s - HALF_STEP_MM)) / (2.0 * HALF_STEP_MM);
+    (p.y - mean) / (1.0 + slope * slope).sqrt()
 }
 
 impl Regions {
@@ -141,7 +148,7 @@ impl Regions {
         let lips = (front * smoothstep(-0.7, 0.6, lip_depth)).max(behind_lips);
         let lip_border = front * (1.0 - smoothstep(0.0, 1.6, lip_depth.abs())) * (1.0 - behind_lips);
         // The opening of the nostril, seen from below, and what lies behind it.
-        let nostril = blob(c, [7.5, -45.0, 91.0], [2.2, 2.6, 5.0]);
+        let nostril = blob(c, [7.5, -43.2, 91.0], [2.0, 1.6, 4.6]);
         let behind_lids = near_eye * smoothstep(-0.2, -1.2, eye);
 
         let ear = blob(c, [90.0, -10.0, -27.0], [8.5, 26.0, 17.0]);

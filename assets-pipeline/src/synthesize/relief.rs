@@ -108,7 +108,8 @@ impl Relief {
         let c = site.place;
         let p = plan(c);
         let dry = (1.0 - r.lips.max(r.inner)).max(0.0);
-        let skin = dry * (1.0 - 0.75 * r.lids);
+        // The skin of the ear is drawn tight over cartilage, and the warp is loose there.
+        let skin = dry * (1.0 - 0.75 * r.lids) * (1.0 - 0.7 * r.ear);
         let tension = tension(p, r);
         let mut gradient = Vec3::ZERO;
         let mut cavity = 0.0;
@@ -153,7 +154,7 @@ impl Relief {
         if r.lips > 0.01 {
             let wave = 0.7 * noise(c, 5.0, self.seed ^ 11);
             let at = c + Vec3::new(wave, 0.0, 0.0);
-            for (across, height_mm, seed) in [(1.7, 0.085, 12u32), (0.8, 0.028, 13)] {
+            for (across, height_mm, seed) in [(1.7, 0.115, 12u32), (0.8, 0.04, 13)] {
                 let (n, g) = grooved(line_noise(at, 90.0, 7.0, across, self.seed ^ seed), 0.03);
                 let strength = r.lips * self.held(0.5 * across);
                 gradient += g * (strength * height_mm);

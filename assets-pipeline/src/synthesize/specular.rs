@@ -18,8 +18,8 @@ const SKIN: [f32; 2] = [0.34, 0.285];
 pub(crate) fn specular(place: Vec3, r: &Regions, cavity: f32, hair: f32, seed: u32) -> [f32; 2] {
     // Offsets from SKIN of the ten regions.
     let regions = [
-        (r.forehead, 0.130, -0.050),
-        (r.glabella, 0.060, -0.020),
+        (r.forehead, 0.085, -0.032),
+        (r.glabella, 0.070, -0.028),
         (r.lids, 0.060, -0.035),
         (r.nose, 0.160, -0.055),
         (r.nose_tip.max(r.nose_wing), 0.130, -0.035),
@@ -39,7 +39,7 @@ pub(crate) fn specular(place: Vec3, r: &Regions, cavity: f32, hair: f32, seed: u
     intensity *= 1.0 + 0.10 * oil;
     roughness *= 1.0 - 0.045 * oil;
     // Lips, linings and lid edges are wet.
-    let wet = [(r.lips, 0.62, 0.205), (r.inner, 0.75, 0.185), (r.lid_edge * 0.7, 0.7, 0.19)];
+    let wet = [(r.lips, 0.62, 0.205), (r.inner, 0.62, 0.24), (r.lid_edge * 0.7, 0.7, 0.19)];
     for (weight, i, m) in wet {
         intensity += weight * (i - intensity);
         roughness += weight * (m - roughness);

@@ -231,6 +231,16 @@ impl Coverage<'_> {
         channels: &[u32],
         evaluate: impl Fn(&Site) -> [f32; N] + Sync,
     ) -> Vec<Map> {
+        self.bake_with(channels, &|| (), evaluate)
+    }
+
+    /// As [`Coverage::bake`]; calls `row_done` after each row, from several threads.
+    pub(crate) fn bake_with<const N: usize>(
+        &self,
+        channels: &[u32],
+        row_done: &(dyn Fn() + Sync),
+        evaluate: impl Fn(&Site) -> [f32; N] + Sync,
+    ) -> Vec<Map> {
         debug_assert_eq!(channels.iter().sum::<u32>() as usize, N);
         let size = self.resolution as usize;
         let mut texels = vec![[0.0f32; N]; size * size];
@@ -240,6 +250,7 @@ impl Coverage<'_> {
                     *texel = evaluate(&site);
                 }
             }
+            row_done();
         });
         let mut first = 0;
         let mut maps = Vec::new();

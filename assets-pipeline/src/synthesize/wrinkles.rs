@@ -31,7 +31,7 @@ const STEP_MM: f32 = 0.12;
 
 /// Course of the nasolabial fold on the left, plan mm: from the wing of the nose past the corner of the mouth.
 const NASOLABIAL: [[f32; 2]; 6] =
-    [[17.0, -35.5], [20.5, -42.5], [25.0, -51.0], [29.3, -60.5], [32.0, -70.0], [32.6, -80.0]];
+    [[16.5, -36.5], [20.5, -43.5], [24.8, -51.5], [28.6, -60.5], [30.8, -70.0], [31.0, -80.0]];
 
 /// Profile of one groove.
 #[derive(Clone, Copy)]
@@ -225,7 +225,7 @@ fn glabella(pen: &mut Pen) {
             Vec2::new(s + 0.55 * lean, 29.0),
             Vec2::new(s + 1.2 * lean, top),
         ];
-        pen.draw(&knots, 1.25, 1.25, [0.36, 0.36]);
+        pen.draw(&knots, 1.05, 1.4, [0.34, 0.34]);
         // Oblique lines of the brow's head pulled in.
         let y = pen.about(25.0, 0.8);
         let oblique = [
@@ -289,11 +289,11 @@ fn crow_feet(pen: &mut Pen, side: f32) {
                 Vec2::new(side * p.x, p.y + 0.25 * pen.stream.normal())
             })
             .collect();
-        pen.draw(&knots, 1.3 * depth, 0.75, [0.3, 0.3]);
+        pen.draw(&knots, 0.72 * depth, 0.95, [0.26, 0.26]);
         if pen.stream.range(0.0, 1.0) < 0.55 {
             let fork: Vec<Vec2> =
                 knots[2..].iter().map(|k| *k + Vec2::new(0.0, 1.7 * angle.signum())).collect();
-            pen.draw(&fork, 0.4 * depth, 0.5, [0.25, 0.25]);
+            pen.draw(&fork, 0.26 * depth, 0.6, [0.25, 0.25]);
         }
     }
     for (drop, depth) in [(4.2, 0.4), (8.2, 0.34)] {
@@ -305,11 +305,11 @@ fn crow_feet(pen: &mut Pen, side: f32) {
             Vec2::new(side * 47.0, -6.2 - drop),
             Vec2::new(side * 54.0, -3.5 - 0.8 * drop),
         ];
-        pen.draw(&knots, depth, 0.75, [0.35, 0.3]);
+        pen.draw(&knots, 0.62 * depth, 1.05, [0.3, 0.26]);
     }
 }
 
-/// The fold from the wing of the nose, with a fainter line on the cheek as of a smile.
+/// The fold from the wing of the nose to beside the mouth.
 fn nasolabial(pen: &mut Pen, side: f32) {
     let shift = 0.5 * pen.stream.normal();
     let knots: Vec<Vec2> = NASOLABIAL
@@ -317,16 +317,15 @@ fn nasolabial(pen: &mut Pen, side: f32) {
         .map(|[s, y]| Vec2::new(side * (s + shift), y + 0.3 * pen.stream.normal()))
         .collect();
     // The cheek rolls over the fold; the lip side stays flat. Downwards along the line, the cheek of the left side
-    // is on the left.
-    let roll = if side > 0.0 { [0.22, 0.04] } else { [0.04, 0.22] };
-    pen.draw(&knots, 1.25, 2.6, roll);
-    // It is deepest at the wing of the nose and runs out below the mouth.
+    // is on the left. The smile itself bends the surface; the groove only sharpens its bottom.
+    let roll = if side > 0.0 { [0.20, 0.02] } else { [0.02, 0.20] };
+    pen.draw(&knots, 0.95, 3.3, roll);
+    // It is deepest under the wing of the nose and runs out before the corner of the mouth.
     if let Some(fold) = pen.grooves.last_mut() {
-        fold.taper = [0.12, 0.45];
+        fold.taper = [0.30, 0.62];
     }
-    let outer = [[31.0, -47.0], [36.0, -55.0], [39.0, -64.0], [40.0, -73.0]]
-        .map(|[s, y]| Vec2::new(side * (s + shift), y + 0.5 * pen.stream.normal()));
-    pen.draw(&outer, 0.22, 1.6, roll);
+    // A crease of the skin itself at the bottom of its upper half.
+    pen.draw(&knots[..4], 0.30, 1.1, [0.1; 2]);
 }
 
 /// The groove between lower lip and chin.

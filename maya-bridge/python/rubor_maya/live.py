@@ -1,4 +1,7 @@
-"""Sends the weights of a head to `rubor view` while the artist works."""
+"""Sends the weights of a head to a viewer on this machine while the artist works.
+
+`rubor view`, which will listen, is not part of rubor yet; until then any program that reads these lines can.
+"""
 
 import socket
 

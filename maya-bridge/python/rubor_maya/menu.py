@@ -11,7 +11,7 @@ def install(host):
     _state["host"] = host
     entries = [
         ("Export selected head...", lambda: guarded(host, export_selected)),
-        ("Send weights live to rubor view", lambda: guarded(host, start_live)),
+        ("Send weights live to a viewer", lambda: guarded(host, start_live)),
         ("Stop sending", lambda: guarded(host, stop_live)),
         ("Import a sequence...", lambda: guarded(host, import_sequence)),
     ]
@@ -62,7 +62,11 @@ def start_live(host):
     try:
         link = live.LiveLink(host, path)
     except OSError as error:
-        raise ValueError("no viewer answers ({}): start `rubor view` first".format(error)) from error
+        # `rubor view` comes later: until then only another program that speaks messages.py can listen.
+        raise ValueError(
+            "no viewer answers ({}): `rubor view` is not part of rubor yet; "
+            "any program that reads the lines of messages.py can listen".format(error)
+        ) from error
     _state["link"] = link
     link.start()
     host.say("sending {}".format(path))

@@ -3,6 +3,7 @@
 pub mod antialias;
 pub(crate) mod appearance;
 pub(crate) mod compose;
+pub(crate) mod cropped_hair;
 pub(crate) mod display;
 pub(crate) mod morph;
 pub(crate) mod overlay;

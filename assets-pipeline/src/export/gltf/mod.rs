@@ -62,6 +62,8 @@ pub struct Options<'a> {
     /// How far weights of the animation may be from the performance; a rotation a quarter of that in each component, a
     /// translation that part of the head's height. 0 leaves out no authored key.
     pub tolerance: f32,
+    /// Straight lines and more keys instead of cubics: Blender drops the slopes of cubic keys.
+    pub only_lines: bool,
 }
 
 impl Default for Options<'_> {
@@ -78,6 +80,7 @@ impl Default for Options<'_> {
             rig: None,
             sequence: None,
             tolerance: 1e-5,
+            only_lines: false,
         }
     }
 }
@@ -179,7 +182,7 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
     if let (Some(rig), Some(sequence)) = (options.rig, options.sequence) {
         let evaluator = Performance { rig, sequence }.evaluator(head, &mut notes)?;
         let height = head.height().max(f32::MIN_POSITIVE);
-        let curves = PerformanceCurves::new(&evaluator, &kept, height, options.tolerance);
+        let curves = PerformanceCurves::new(&evaluator, &kept, height, options.tolerance, options.only_lines);
         if let Some(animation) = animation::write(&curves, &mut buffer) {
             document["animations"] = json!([animation]);
             keys =

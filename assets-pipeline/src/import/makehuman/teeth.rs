@@ -16,6 +16,8 @@ const SCALE: f32 = 10.0;
 /// Biting edge of the upper incisors below the line where the lips meet, metres: at rest the lip shows a little of
 /// them (2 mm in young adults), and the landmark lies on the lower lip's rim, 4 mm above.
 const SHOWN: f32 = 0.0062;
+/// How far the rows are moved forward after they were made narrower, metres: lips rest on the teeth.
+const FORWARD: f32 = 0.0008;
 /// How the tongue is moved, metres.
 const TONGUE: Vec3 = Vec3::new(0.0, -0.007, -0.006);
 /// The lower incisors reach behind the upper ones by this, metres.
@@ -44,7 +46,7 @@ pub(super) fn fit(mesh: &mut PolyMesh) {
         let wanted = lips - SHOWN + if upper { 0.0 } else { OVERBITE };
         for p in &points {
             let p = &mut mesh.points[*p as usize];
-            *p = Vec3::new(0.92 * p.x, p.y + wanted - edge, p.z - 0.001);
+            *p = Vec3::new(0.92 * p.x, p.y + wanted - edge, p.z + FORWARD);
         }
         assign_texture_coordinates(mesh, &faces, &points, sign);
     }

@@ -6,16 +6,15 @@
 @group(0) @binding(2) var depth: texture_2d<f32>;
 // Bits of 32 neighbouring pixels: edges along the line, edges across it. Rows first, then columns.
 @group(0) @binding(3) var<storage, read_write> bits: array<vec2<u32>>;
-// Tiles with edges: their count, workgroups for them (an indirect dispatch), x in the low and y in the high half.
+// Tiles with edges: x in the low and y in the high half.
 @group(0) @binding(4) var<storage, read_write> tiles: Tiles;
 // The image where COPY, or a single texel.
 @group(0) @binding(5) var copy: texture_storage_2d<OUTPUT_FORMAT, write>;
 
 struct Tiles {
     count: atomic<u32>,
-    workgroups_x: atomic<u32>,
-    workgroups_y: u32,
-    workgroups_z: u32,
+    // Workgroups that have read the count.
+    readers: u32,
     list: array<u32>,
 }
 
@@ -182,9 +181,8 @@ fn edges(
             }
             bits[params.first_column + x * params.words.y + tile.y] = vec2(line, atomicLoad(&top_columns[index - 32u]));
         }
-    } else if index == 64u && atomicLoad(&active_tile) == 1u {
+    } else if LIST_TILES && index == 64u && atomicLoad(&active_tile) == 1u {
         let slot = atomicAdd(&tiles.count, 1u);
         tiles.list[slot] = tile.x | (tile.y << 16u);
-        atomicMax(&tiles.workgroups_x, min(slot + 1u, MOST_WORKGROUPS));
     }
 }

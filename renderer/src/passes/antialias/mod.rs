@@ -25,7 +25,7 @@
 //!   (tests compare both), and no search texture is read.
 //! - Coverage comes from a table for whole distances (see [`lookups`]): one read, no square root, no filtering.
 //!   Weights are integers and agree bit for bit between processors.
-//! - Only tiles of 32 x 32 pixels with edges get the two later kernels, through a list and indirect dispatch; in a
+//! - Only tiles of 32 x 32 pixels with edges get the two later kernels, through a list that workgroups share; in a
 //!   tile the pixels concerned are gathered first. Nothing is cleared: weights are read only beside edges. The edge
 //!   kernel copies the image on its way, so that 1x reads and writes every pixel once.
 //! - Contrast is compared in whole 1/65535 steps of luma, so ties do not depend on rounding. Alpha is a channel of its
@@ -39,7 +39,8 @@
 //!   last column and row, crossing ones too.
 //! - MLAA finds exact distances, where that of chapter 9 may be one pixel off.
 //! - T2x and 4x keep speed apart from alpha and filter the speed itself, not its square root; a previous position
-//!   outside of the image counts as unknown.
+//!   outside of the image counts as unknown. A pixel moves as the fastest of it and its neighbours, as on outlines the
+//!   two samples see different things, and speeds are compared in pixels, not in parts of the image.
 //!
 //! # Inputs and outputs
 //! - Colours: any texture that loads as `f32`, one for each of [`Mode::subsamples`], encoded as
@@ -73,13 +74,15 @@ use wgpu::{BindingResource, TextureFormat, TextureUsages, TextureView};
 
 /// K of equation 10.6: how fast the previous frame fades with the difference of speeds.
 pub const REPROJECTION_WEIGHT: f32 = 30.0;
+/// Pixels a frame that are a speed of 1 in equation 10.6: the width that its K was published for. A trail is as many
+/// pixels long in an image of any size.
+pub const SPEED_UNIT_PX: f32 = 1280.0;
 
 /// Pixels a side of the tiles that are listed where they have edges; the width of a word of edge bits.
 const TILE: u32 = 32;
-/// WebGPU's default limit on the workgroups of one dimension of a dispatch.
-const MOST_WORKGROUPS: u32 = 65535;
-/// Bytes before the workgroups in a list of tiles.
-const INDIRECT_OFFSET: u64 = 4;
+/// Workgroups that share the listed tiles, at most: as many as a large GPU holds at once. They are dispatched directly,
+/// since an indirect dispatch waits for its count and has it checked by another dispatch.
+const MOST_WORKGROUPS: u32 = 2048;
 /// Relative rounding of the half floats that the history is stored in.
 const HISTORY_PRECISION: f32 = 1.0 / 1024.0;
 
@@ -336,7 +339,10 @@ impl Antialias {
                     let weights_texture = texture("antialias weights", size, TextureFormat::Rgba8Unorm);
                     Sample {
                         bits: gpu.storage_zeroed("antialias edge bits", bits_bytes),
-                        tiles: tile_list(gpu, u64::from(words[0]) * u64::from(words[1])),
+                        tiles: gpu.storage_zeroed(
+                            "antialias tiles",
+                            8 + 4 * u64::from(words[0]) * u64::from(words[1]),
+                        ),
                         weights: view(&weights_texture),
                         weights_texture,
                     }
@@ -369,6 +375,10 @@ impl Antialias {
         let weights = 4 * u64::from(self.size[0]) * u64::from(self.size[1]);
         let samples = self.samples.iter().map(|sample| sample.bits.size() + sample.tiles.size() + weights);
         samples.sum::<u64>() + self.areas.size()
+    }
+
+    fn tile_workgroups(&self) -> u32 {
+        (self.size[0].div_ceil(TILE) * self.size[1].div_ceil(TILE)).min(MOST_WORKGROUPS)
     }
 
     fn by_tiles(&self) -> bool {
@@ -412,8 +422,6 @@ impl Antialias {
             let color = inputs.colors[index];
             let depth = if self.settings.needs_depth() { inputs.depths[index] } else { &self.unused_texture };
             let copy = if self.by_tiles() { output } else { &self.unused_output };
-            // The count and the workgroups in x; the list needs no clearing.
-            encoder.clear_buffer(&sample.tiles, 0, Some(8));
             {
                 let group = gpu.bind(
                     "antialias edges",
@@ -450,7 +458,7 @@ impl Antialias {
             pass.set_pipeline(&self.weights);
             pass.set_bind_group(0, &group, &[]);
             match self.dispatch {
-                Dispatch::Tiles => pass.dispatch_workgroups_indirect(&sample.tiles, INDIRECT_OFFSET),
+                Dispatch::Tiles => pass.dispatch_workgroups(self.tile_workgroups(), 1, 1),
                 Dispatch::Screen => {
                     pass.dispatch_workgroups(self.size[0].div_ceil(8), self.size[1].div_ceil(8), 1)
                 }
@@ -482,16 +490,16 @@ impl Antialias {
             &[
                 self.params[0][0].as_entire_binding(),
                 sample.bits.as_entire_binding(),
-                sample.tiles.as_entire_binding(),
                 BindingResource::TextureView(inputs.colors[0]),
                 BindingResource::TextureView(&sample.weights),
+                sample.tiles.as_entire_binding(),
                 BindingResource::TextureView(output),
             ],
         );
         let mut pass = timer.compute(encoder, "antialias blend");
         pass.set_pipeline(&self.last);
         pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups_indirect(&sample.tiles, INDIRECT_OFFSET);
+        pass.dispatch_workgroups(self.tile_workgroups(), 1, 1);
     }
 
     fn record_resolve(
@@ -547,18 +555,6 @@ impl Antialias {
     }
 }
 
-/// An empty list for `tiles` tiles: count, workgroups (0, 1, 1), tiles.
-fn tile_list(gpu: &Gpu, tiles: u64) -> wgpu::Buffer {
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("antialias tiles"),
-        size: 16 + 4 * tiles,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    gpu.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&[0u32, 0, 1, 1]));
-    buffer
-}
-
 /// The kernels of the pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kernel {
@@ -579,10 +575,11 @@ impl Kernel {
             Self::Edges => format!(
                 "const SOURCE_COLOR = 1u;\nconst SOURCE_DEPTH = 2u;\nconst EDGE_SOURCE = {edge_source}u;\n\
                  const LINEAR_INPUT = {};\nconst PREDICATION = {};\nconst LOCAL_CONTRAST = {};\nconst COPY = {by_tiles};\n\
-                 const STEPS = {:?}f;\nconst BRIGHTEST = {:?}f;\nconst MOST_WORKGROUPS = {MOST_WORKGROUPS}u;\n",
+                 const LIST_TILES = {};\nconst STEPS = {:?}f;\nconst BRIGHTEST = {:?}f;\n",
                 settings.encoding == Encoding::Linear,
                 settings.predication.is_some(),
                 mode != Mode::Mlaa,
+                mode != Mode::None && dispatch == Dispatch::Tiles,
                 reference::STEPS,
                 reference::BRIGHTEST,
             ),
@@ -597,29 +594,37 @@ impl Kernel {
             ),
             Self::Blend | Self::Resolve => format!(
                 "const DECODE = {};\nconst AVERAGE_LINES = {};\nconst PAIR = {};\nconst TEMPORAL = {};\n\
-                 const REPROJECTION_WEIGHT = {REPROJECTION_WEIGHT:?}f;\nconst HISTORY_PRECISION = {HISTORY_PRECISION:?}f;\n",
+                 const REPROJECTION_WEIGHT = {REPROJECTION_WEIGHT:?}f;\nconst SPEED_UNIT_PX = {SPEED_UNIT_PX:?}f;\n\
+                 const HISTORY_PRECISION = {HISTORY_PRECISION:?}f;\n",
                 settings.encoding == Encoding::Srgb && settings.blend_space == BlendSpace::Linear,
                 mode == Mode::Mlaa,
                 mode.subsamples(0).len() == 2,
                 mode.is_temporal(),
             ),
         };
+        // The last kernel that reads the list of tiles empties it.
+        let empties_list = if by_tiles { self == Self::Blend } else { self == Self::Weights };
         let constants = format!(
-            "{constants}const STRAIGHT_ALPHA = {};\nconst PUBLISHED = {};\n",
+            "{constants}const EMPTIES_LIST = {empties_list};\nconst STRAIGHT_ALPHA = {};\nconst PUBLISHED = {};\n",
             settings.alpha == Alpha::Straight,
             settings.patterns == Patterns::Published,
         );
         let parts: &[&str] = match self {
             Self::Edges => &[include_str!("edges.wgsl")],
-            Self::Weights if dispatch == Dispatch::Tiles => {
-                &[include_str!("weights.wgsl"), include_str!("weights_tiles.wgsl")]
-            }
+            Self::Weights if dispatch == Dispatch::Tiles => &[
+                include_str!("weights.wgsl"),
+                include_str!("weights_tiles.wgsl"),
+                include_str!("tiles.wgsl"),
+            ],
             Self::Weights => &[include_str!("weights.wgsl"), include_str!("weights_screen.wgsl")],
-            Self::Blend => &[include_str!("mixing.wgsl"), include_str!("blend.wgsl")],
+            Self::Blend => {
+                &[include_str!("mixing.wgsl"), include_str!("blend.wgsl"), include_str!("tiles.wgsl")]
+            }
             Self::Resolve => &[include_str!("mixing.wgsl"), include_str!("resolve.wgsl")],
         };
         let shared = include_str!("shared.wgsl");
-        let body = parts.concat().replace("OUTPUT_FORMAT", output_format);
+        let entry = if self == Self::Blend { "blend" } else { "weights" };
+        let body = parts.concat().replace("OUTPUT_FORMAT", output_format).replace("EVERY_TILE", entry);
         format!("{constants}\n{shared}\n{body}")
     }
 }

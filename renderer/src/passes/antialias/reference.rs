@@ -592,7 +592,7 @@ pub fn average(pictures: &[Picture], settings: &Settings) -> Picture {
     Picture { pixels, ..pictures[0] }
 }
 
-/// Share of the previous frame (equation 10.6) for speeds in fractions of the image's sides per frame.
+/// Share of the previous frame (equation 10.6) for speeds in units of [`super::SPEED_UNIT_PX`] a frame.
 pub fn history_share(speed: f32, previous_speed: f32) -> f32 {
     0.5 * (1.0 - super::REPROJECTION_WEIGHT * (speed - previous_speed).abs().sqrt()).max(0.0)
 }

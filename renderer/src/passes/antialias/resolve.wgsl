@@ -73,10 +73,24 @@ fn shares_b(q: Position) -> vec4<f32> {
     return vec4(0.0);
 }
 
-// Speed in fractions of the image's sides per frame.
+// Motion of the fastest of a pixel and its eight neighbours. On the outline of what moves, samples see it in one frame
+// and what lies behind in the next; both frames have to follow the same of the two.
+fn motion_at(p: vec2<i32>) -> vec2<f32> {
+    let last = vec2<i32>(params.size) - 1;
+    var fastest = vec2(0.0);
+    for (var i = 0; i < 9; i++) {
+        let q = clamp(p + vec2(i % 3, i / 3) - 1, vec2(0), last);
+        let other = textureLoad(velocity, q, 0).xy;
+        if dot(other, other) > dot(fastest, fastest) {
+            fastest = other;
+        }
+    }
+    return fastest;
+}
+
+// Speed in units of SPEED_UNIT_PX a frame.
 fn speed_at(p: vec2<i32>) -> f32 {
-    let q = clamp(p, vec2(0), vec2<i32>(params.size) - 1);
-    return length(textureLoad(velocity, q, 0).xy / vec2<f32>(params.size));
+    return length(motion_at(p)) / SPEED_UNIT_PX;
 }
 
 // Speeds are mixed like the colours, so that blended pixels do not leave trails (section 10.4.4).
@@ -148,7 +162,7 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
         // The largest half.
         textureStore(kept_light, q.p, min(light, vec4(65504.0)));
         textureStore(kept_speed, q.p, vec4(speed, 0.0, 0.0, 0.0));
-        let origin = vec2<f32>(q.p) + 0.5 - textureLoad(velocity, q.p, 0).xy;
+        let origin = vec2<f32>(q.p) + 0.5 - motion_at(q.p);
         if params.history_valid == 1u && all(origin >= vec2(0.0)) && all(origin <= vec2<f32>(params.size)) {
             let previous = previous_at(origin);
             // Equations 10.6 and 10.7.

@@ -393,14 +393,61 @@ fn moving_shapes_leave_no_trail() {
         for (i, color) in found.pixels.iter().enumerate() {
             let (x, y) = ((i % size[0]) as f64 + 0.5, (i / size[0]) as f64 + 0.5);
             let distance = (x - place(frame)).hypot(y - 24.0);
-            // Naive mixing leaves half of the disk behind. Here a pixel that had a share a of the disk had a / 32 of
-            // its speed and leaves a / 2 (1 - 30 sqrt(a / 32)), at most 0.0026 of 0.6 of light (at a = 0.016):
-            // 0.0105 in dark encoded colour.
+            // Naive mixing leaves half of the disk behind. Here all pixels that had a share of the disk, and their
+            // neighbours, had its speed.
             if distance > 11.3 {
-                assert!((color[0] - 0.1).abs() < 0.0105, "frame {frame}: ({x}, {y}) is {color:?}");
+                assert!((color[0] - 0.1).abs() < 0.004, "frame {frame}: ({x}, {y}) is {color:?}");
             }
             if distance < 7.3 {
                 assert!((color[0] - 0.8).abs() < 0.004, "frame {frame}: ({x}, {y}) is {color:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_list_of_tiles_is_empty_for_the_next_image() {
+    let Some(gpu) = gpu() else { return };
+    let settings = Settings::new(Mode::Smaa1x, Preset::High);
+    let mut filter = Filter::new(gpu, settings).unwrap();
+    let pictures = hostile_pictures(130, 70);
+    let first: Vec<Picture> = pictures.iter().map(|(_, picture)| filter.picture(picture).unwrap()).collect();
+    for ((name, picture), first) in pictures.iter().zip(&first).rev() {
+        assert_eq!(&filter.picture(picture).unwrap(), first, "{name}");
+    }
+}
+
+#[test]
+fn outlines_of_what_moves_take_half_of_the_previous_frame() {
+    let Some(gpu) = gpu() else { return };
+    let size = [64usize, 48];
+    let settings = Settings::new(Mode::SmaaT2x, Preset::High);
+    let tables = Tables::new(&settings);
+    let mut frames =
+        Frames::new(gpu, settings, size.map(|s| s as u32), TextureFormat::Rgba32Float, Dispatch::Tiles);
+    // A whole number of pixels a frame: in its own frame of reference the disk stands still.
+    let scene = |frame: u64| disk(17.3 + 2.0 * frame as f64, 24.1);
+    for frame in 0..6 {
+        let position = settings.mode.subsamples(frame)[0].position_px;
+        let velocity: Vec<[f32; 2]> = sampled(&scene(frame), size, position)
+            .pixels
+            .iter()
+            .map(|color| if color[0] > 0.5 { [2.0, 0.0] } else { [0.0, 0.0] })
+            .collect();
+        let found = frames.run(&samples(&scene(frame), size, settings.mode, frame), Some(&velocity), None);
+        if frame > 0 {
+            let still = [0, 1].map(|turn| {
+                filter_samples(&samples(&scene(frame), size, settings.mode, turn), turn, &tables, &settings)
+            });
+            let expected = average(&still, &settings);
+            for (i, (a, b)) in found.pixels.iter().zip(&expected.pixels).enumerate() {
+                let (x, y) = ((i % size[0]) as f64 + 0.5, (i / size[0]) as f64 + 0.5);
+                let distance = (x - 17.3 - 2.0 * frame as f64).hypot(y - 24.1) - 9.3;
+                // Further out only one of the samples may have the disk next to the pixel, and history is refused.
+                if distance.abs() > 0.7 {
+                    continue;
+                }
+                assert!((a[0] - b[0]).abs() < 2e-3, "frame {frame}: ({x}, {y}) is {a:?}, expected {b:?}");
             }
         }
     }
@@ -565,7 +612,7 @@ fn rust_and_wgsl_agree_on_the_parameters() {
                 let group = match (kernel, dispatch) {
                     (Kernel::Edges, _) => [TILE, 8, 1],
                     (Kernel::Resolve, _) | (Kernel::Weights, Dispatch::Screen) => [8, 8, 1],
-                    _ => [64, 1, 1],
+                    _ => [128, 1, 1],
                 };
                 assert_eq!(module.entry_points[0].workgroup_size, group);
             }

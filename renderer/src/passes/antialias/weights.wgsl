@@ -260,8 +260,16 @@ fn stair_weights(lines: Lines, line: i32, at: i32, rises: bool, block: u32) -> v
 
 fn revised_weights(lines: Lines, line: i32, at: i32, line_block: u32, falling_block: u32) -> vec2<u32> {
     if DIAGONALS {
-        let found = stair_weights(lines, line, at, true, params.blocks.z)
-            + stair_weights(lines, line, at, false, falling_block);
+        // Most edges have no riser at either end.
+        let below = ahead(lines, line, at).y;
+        let above = ahead(lines, line - 1, at).y;
+        var found = vec2(0u);
+        if (((above >> 1u) | below) & 1u) == 1u {
+            found = stair_weights(lines, line, at, true, params.blocks.z);
+        }
+        if (((below >> 1u) | above) & 1u) == 1u {
+            found += stair_weights(lines, line, at, false, falling_block);
+        }
         if any(found != vec2(0u)) {
             return found;
         }

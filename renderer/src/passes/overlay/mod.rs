@@ -1,8 +1,11 @@
 //! Lashes, hair cards and wet films: the only blended triangles of a frame, drawn over the composed picture.
 //!
 //! ```text
-//! positions, frames, depth (tested, not written), hdr --overlay--> hdr (premultiplied over)
+//! positions, frames, depth (tested, not written), hdr --overlay--> hdr, velocity (premultiplied over)
 //! ```
+//!
+//! Motion is mixed with that of what lies behind as colours are: where hair moves before a background that stands
+//! still, history would otherwise be taken from beside the hair.
 //!
 //! A strand of hair is a fraction of a pixel wide: its coverage is computed from its width, so it fades instead of
 //! flickering. `uv` of [`rubor_rig::head::Material::Lash`] says where along the lid and along the strand.
@@ -34,47 +37,60 @@ pub(crate) struct Params {
 
 /// The pipeline of the pass.
 pub(crate) struct Overlay {
-    pipeline: wgpu::RenderPipeline,
+    /// Colour only, and colour with motion.
+    pipelines: [wgpu::RenderPipeline; 2],
+}
+
+/// What the pass reads of one head.
+pub(crate) struct Overlaid<'a> {
+    pub(crate) head: &'a HeadOnGpu,
+    pub(crate) positions: &'a wgpu::Buffer,
+    pub(crate) previous_positions: &'a wgpu::Buffer,
+    pub(crate) frames: &'a wgpu::Buffer,
 }
 
 impl Overlay {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         let module = gpu.shader("overlay", SHADER);
-        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("overlay"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("overlay_vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: wgpu::TextureFormat::Depth32Float,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("overlay_fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(wgpu::ColorTargetState {
-                    format: wgpu::TextureFormat::Rgba16Float,
-                    blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-                    write_mask: wgpu::ColorWrites::COLOR,
-                })],
-            }),
-            multiview_mask: None,
-            cache: None,
+        let target = Some(wgpu::ColorTargetState {
+            format: wgpu::TextureFormat::Rgba16Float,
+            blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+            write_mask: wgpu::ColorWrites::COLOR,
         });
-        Self { pipeline }
+        let targets = [target.clone(), target];
+        let pipeline = |targets: &[Option<wgpu::ColorTargetState>]| {
+            gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some("overlay"),
+                layout: None,
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some("overlay_vertex"),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: wgpu::TextureFormat::Depth32Float,
+                    depth_write_enabled: Some(false),
+                    depth_compare: Some(wgpu::CompareFunction::Greater),
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                }),
+                multisample: Default::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some("overlay_fragment"),
+                    compilation_options: Default::default(),
+                    targets,
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        Self { pipelines: [pipeline(&targets[..1]), pipeline(&targets)] }
     }
 
-    /// `heads` are (head, positions, frames); `ambient` is the irradiance / pi that hair sees on average.
+    /// `ambient` is the irradiance / pi that hair sees on average.
     pub(crate) fn record(
         &self,
         gpu: &Gpu,
@@ -82,23 +98,30 @@ impl Overlay {
         timer: &mut PassTimer,
         view: &wgpu::Buffer,
         ambient: Vec3,
-        heads: &[(&HeadOnGpu, &wgpu::Buffer, &wgpu::Buffer)],
+        heads: &[Overlaid<'_>],
         [depth, hdr]: [&wgpu::TextureView; 2],
+        velocity: Option<&wgpu::TextureView>,
     ) {
-        let color = wgpu::RenderPassColorAttachment {
-            view: hdr,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
-        };
+        let colors: Vec<_> = std::iter::once(hdr)
+            .chain(velocity)
+            .map(|view| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+                })
+            })
+            .collect();
+        let pipeline = &self.pipelines[usize::from(velocity.is_some())];
         let depth = wgpu::RenderPassDepthStencilAttachment {
             view: depth,
             depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store }),
             stencil_ops: None,
         };
-        let mut pass = timer.render(encoder, "overlay", &[Some(color)], Some(depth));
-        pass.set_pipeline(&self.pipeline);
-        for (head, positions, frames) in heads {
+        let mut pass = timer.render(encoder, "overlay", &colors, Some(depth));
+        pass.set_pipeline(pipeline);
+        for Overlaid { head, positions, previous_positions, frames } in heads {
             let params = Params {
                 ambient: ambient.extend(0.0).to_array(),
                 first: head.opaque_triangles,
@@ -110,7 +133,7 @@ impl Overlay {
             let params = gpu.uniform("overlay", &params);
             let group = gpu.bind_layout(
                 "overlay",
-                &self.pipeline.get_bind_group_layout(0),
+                &pipeline.get_bind_group_layout(0),
                 &[
                     view.as_entire_binding(),
                     params.as_entire_binding(),
@@ -118,6 +141,7 @@ impl Overlay {
                     head.vertices.as_entire_binding(),
                     head.triangles.as_entire_binding(),
                     frames.as_entire_binding(),
+                    previous_positions.as_entire_binding(),
                 ],
             );
             pass.set_bind_group(0, &group, &[]);

@@ -19,6 +19,7 @@ struct Params {
 @group(0) @binding(3) var<storage, read> vertices: array<Vertex>;
 @group(0) @binding(4) var<storage, read> triangles: array<vec4u>;
 @group(0) @binding(5) var<storage, read> frames: array<SurfaceFrame>;
+@group(0) @binding(6) var<storage, read> previous_positions: array<vec4f>;
 
 // Numbers of rig's Material::ALL.
 const LASH = 5u;
@@ -33,10 +34,24 @@ struct Corner {
     // Share of the drawn width that the hair fills, and where across it, -1 to 1.
     @location(4) opacity: f32,
     @location(5) across: f32,
+    // x, y, w of the place in the image, without jitter, in this frame and the previous one.
+    @location(6) now: vec3f,
+    @location(7) before: vec3f,
+}
+
+struct Fragment {
+    // Premultiplied radiance and coverage.
+    @location(0) color: vec4f,
+    // Premultiplied motion in pixels, x right, y down, and coverage: it is mixed with that of what lies behind as the
+    // colours are. Only frames that keep a history have a target for it.
+    @location(1) motion: vec4f,
 }
 
 // Width of a hair that is geometry, at its root, metres (u >= 2: rubor-assets' strands).
 const STRAND_WIDTH = 0.00013;
+
+// Lashes are the stoutest hairs of the face, and each stands for two or three that cling together.
+const LASH_STOUTNESS = 1.7;
 
 @vertex
 fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
@@ -51,7 +66,7 @@ fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
     if (triangle.w == LASH || triangle.w == HAIR) && vertex.u >= 2.0 {
         // A hair faces the viewer and is drawn no thinner than a pixel; it fades instead.
         let side = vertex.u - 2.0 * floor(0.5 * vertex.u) - 0.5;
-        let width = STRAND_WIDTH * (1.0 - vertex.v * vertex.v);
+        let width = STRAND_WIDTH * select(1.0, LASH_STOUTNESS, triangle.w == LASH) * (1.0 - vertex.v * vertex.v);
         let center = position - side * width * frame.tangent;
         let along = cross(frame.normal, frame.tangent);
         clip = view.clip_from_world * vec4f(center, 1.0);
@@ -65,15 +80,23 @@ fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
         clip += vec4f(normal * side * drawn * 2.0 / vec2f(view.size) * clip.w, 0.0, 0.0);
     }
     clip += vec4f(vec2f(2.0, -2.0) * view.jitter / vec2f(view.size) * clip.w, 0.0, 0.0);
-    return Corner(clip, vec2f(vertex.u, vertex.v), position, frame.normal, triangle.w, opacity, across);
+    let now = view.clip_from_world * vec4f(position, 1.0);
+    let before = view.previous_clip_from_world * vec4f(previous_positions[vertex.point].xyz, 1.0);
+    let uv = vec2f(vertex.u, vertex.v);
+    return Corner(clip, uv, position, frame.normal, triangle.w, opacity, across, now.xyw, before.xyw);
 }
 
 // Strands across a card of unit width.
 const LASH_STRANDS = 46.0;
 
-// Premultiplied radiance and coverage.
 @fragment
-fn overlay_fragment(corner: Corner) -> @location(0) vec4f {
+fn overlay_fragment(corner: Corner) -> Fragment {
+    let color = overlay_color(corner);
+    let motion = (corner.now.xy / corner.now.z - corner.before.xy / corner.before.z) * vec2f(0.5, -0.5) * vec2f(view.size);
+    return Fragment(color, vec4f(motion * color.a, 0.0, color.a));
+}
+
+fn overlay_color(corner: Corner) -> vec4f {
     if (corner.material == LASH || corner.material == HAIR) && corner.uv.x >= 1.5 {
         // Brighter along its middle, as a cylinder is; each hair a little lighter or darker than the next.
         let id = floor(0.5 * corner.uv.x);

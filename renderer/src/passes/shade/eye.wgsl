@@ -3,7 +3,6 @@
 
 // The azimuthal coordinates of Material::Eye. Angles in radians.
 const IRIS_ANGLE = 0.5146;
-const PUPIL_ANGLE = 0.195;
 const EYE_RADIUS_MM = 12.0;
 const IRIS_DEPTH_MM = 2.2;
 
@@ -55,8 +54,8 @@ fn is_eye(pixel: vec2f) -> bool {
 fn iris_colors() -> mat2x3f {
     let hair = dot(params.hair_color.rgb, vec3f(0.2126, 0.7152, 0.0722));
     let brown = mat2x3f(vec3f(0.085, 0.036, 0.014), vec3f(0.038, 0.017, 0.008));
-    let hazel = mat2x3f(vec3f(0.150, 0.078, 0.028), vec3f(0.075, 0.070, 0.042));
-    let blue = mat2x3f(vec3f(0.150, 0.140, 0.100), vec3f(0.085, 0.125, 0.150));
+    let hazel = mat2x3f(vec3f(0.108, 0.061, 0.030), vec3f(0.054, 0.051, 0.037));
+    let blue = mat2x3f(vec3f(0.125, 0.120, 0.095), vec3f(0.078, 0.105, 0.122));
     let first = smoothstep(0.0100, 0.0122, hair);
     let second = smoothstep(0.05, 0.16, hair);
     return brown * (1.0 - first) + hazel * (first * (1.0 - second)) + blue * (first * second);
@@ -74,6 +73,7 @@ fn eye(
 ) {
     let from_axis = uv - 0.5;
     let theta = 2.0 * PI * length(from_axis);
+    let pupil_angle = clamp(0.5 * params.pupil_mm / EYE_RADIUS_MM, 0.02, 0.9 * IRIS_ANGLE);
     (*surface).specular = 1.0;
     (*surface).f0 = 0.025;
     (*surface).roughness = mix(0.05, 0.13, smoothstep(IRIS_ANGLE, IRIS_ANGLE + 0.15, theta));
@@ -90,7 +90,7 @@ fn eye(
     let pixel = clamp(2.0 * PI * max(length(duv_dx), length(duv_dy)), 0.005, 0.2);
 
     // Iris: fibres that run out from a wavy collarette, crypts between them, a dark limbal ring.
-    let r = clamp((radius - PUPIL_ANGLE) / (IRIS_ANGLE - PUPIL_ANGLE), 0.0, 1.0);
+    let r = clamp((radius - pupil_angle) / (IRIS_ANGLE - pupil_angle), 0.0, 1.0);
     let turn = around / (2.0 * PI);
     let fibre_fade = clamp(0.05 / pixel, 0.0, 1.0);
     // Noise on the circle: wraps after whole numbers of cells.
@@ -104,18 +104,20 @@ fn eye(
     let collarette = smoothstep(0.42, 0.22, r + 0.16 * wave);
     var iris = mix(colors[1], colors[0], 0.85 * collarette);
     iris *= 0.45 + 1.25 * texture - 0.25 * crypts;
-    iris *= 1.0 - 0.80 * smoothstep(0.74, 0.98, r);
+    iris *= 1.0 - 0.86 * smoothstep(0.70, 0.97, r);
     iris *= mix(0.6, 1.0, smoothstep(0.0, 0.12, r));
-    let pupil = smoothstep(PUPIL_ANGLE - pixel, PUPIL_ANGLE + pixel, radius);
+    let pupil = smoothstep(pupil_angle - pixel, pupil_angle + pixel, radius);
     iris *= mix(0.04, 1.0, pupil);
 
     // Sclera: grey-yellow, veined and red towards the corners, where the caruncle is flesh.
     let blush = smoothstep(0.62, 1.25, theta);
     let vein_at = vec2f(turn * 34.0 + 1.6 * eye_noise(from_axis * 60.0), theta * 3.2);
     let vein = smoothstep(0.10, 0.0, abs(eye_noise(vein_at) - 0.5)) * smoothstep(0.6, 1.1, theta);
-    var sclera = mix(vec3f(0.50, 0.465, 0.43), vec3f(0.43, 0.27, 0.23), blush);
+    var sclera = mix(vec3f(0.44, 0.405, 0.37), vec3f(0.38, 0.235, 0.20), blush);
     sclera *= mix(vec3f(1.0), vec3f(0.93, 0.66, 0.60), 0.6 * vein * clamp(0.04 / pixel, 0.2, 1.0));
-    let limbus = smoothstep(IRIS_ANGLE - 0.07 - pixel, IRIS_ANGLE + 0.06 + pixel, radius);
+    // The ball turns away into the corners, where lids, lashes and caruncle keep the light off.
+    sclera *= 1.0 - 0.38 * smoothstep(0.62, 1.15, theta);
+    let limbus = smoothstep(IRIS_ANGLE - 0.07 - pixel, IRIS_ANGLE + 0.075 + pixel, radius);
     (*surface).albedo = mix(iris, sclera, limbus);
 
     // The iris is a shallow bowl: it is lit as if it faced the middle.

@@ -46,7 +46,8 @@ fn micro_relief(uv: vec2f, duv_dx: vec2f, duv_dy: vec2f) -> vec3f {
     for (var i = 0; i < 2; i++) {
         let mesh_mm = select(0.42, 0.19, i == 1);
         let depth = select(0.060, 0.045, i == 1);
-        let seen = smoothstep(0.75 * mesh_mm, 0.25 * mesh_mm, pixel_mm);
+        // Cells of under three pixels would glitter: they become roughness.
+        let seen = smoothstep(0.42 * mesh_mm, 0.17 * mesh_mm, pixel_mm);
         if seen > 0.0 {
             result += vec3f(depth * seen * cell_slopes(uv * MM_PER_TEXTURE / mesh_mm + 17.0 * f32(i)), 0.0);
         }

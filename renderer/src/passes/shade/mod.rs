@@ -130,7 +130,7 @@ pub(crate) struct Params {
     pub(crate) is_second_sample: u32,
     pub(crate) transmit_per_mm: f32,
     pub(crate) adds_differences: u32,
-    pub(crate) padding: u32,
+    pub(crate) pupil_mm: f32,
     pub(crate) ring_taps_mm: [f32; RINGS],
     pub(crate) ring_ends_mm: [f32; RINGS],
     pub(crate) harmonics: [[f32; 4]; 9],
@@ -251,6 +251,7 @@ pub(crate) struct Shaded<'a> {
     pub(crate) frames: &'a wgpu::Buffer,
     pub(crate) blended: &'a Blended,
     pub(crate) hemoglobin_scale: f32,
+    pub(crate) pupil_mm: f32,
     pub(crate) wrinkles: WrinkleMethod,
 }
 
@@ -454,7 +455,7 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
         },
         is_second_sample: u32::from(lighting.first.is_some()),
         adds_differences: u32::from(shaded.wrinkles == WrinkleMethod::Difference),
-        padding: 0,
+        pupil_mm: shaded.pupil_mm,
         transmit_per_mm: lighting.transmittance.map_or(0.0, |t| 1.0 / t.thickness_max_mm),
         ring_taps_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_taps_mm),
         ring_ends_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_ends_mm),

@@ -37,7 +37,7 @@ fn teeth(surface: ptr<function, Surface>, uv: vec2f, tangent: vec3f, bitangent: 
     let root = smoothstep(0.55, 1.0, height_mm / crown_mm);
     let edge = smoothstep(1.6, 0.2, height_mm);
     let own = fract(sin(f32(number) * 12.9 + select(3.7, 0.0, along_mm > 0.0) + select(1.3, 0.0, upper)) * 437.5);
-    var enamel = mix(vec3f(0.60, 0.545, 0.445), vec3f(0.50, 0.41, 0.29), 0.55 * root);
+    var enamel = mix(vec3f(0.69, 0.62, 0.51), vec3f(0.57, 0.47, 0.34), 0.55 * root);
     enamel *= 0.88 + 0.16 * own - 0.10 * select(0.0, 1.0, number == 2u);
     enamel = mix(enamel, vec3f(0.44, 0.43, 0.40), 0.45 * edge);
     enamel *= 1.0 - 0.75 * seam;
@@ -49,5 +49,10 @@ fn teeth(surface: ptr<function, Surface>, uv: vec2f, tangent: vec3f, bitangent: 
     let slope = select(0.0, 1.0, abs(x) < 1.0) * side * (0.55 * pow(abs(x), 3.0) * sign(x)) * (1.0 - 0.5 * gum);
     let fall = select(-1.0, 1.0, upper) * 0.35 * smoothstep(0.6, 1.0, height_mm / max(gum_line, 1.0)) * (1.0 - gum);
     (*surface).normal = normalize((*surface).normal + slope * tangent + fall * bitangent);
-    (*surface).occlusion = max((*surface).occlusion, mix(0.34, 0.03, smoothstep(8.0, 38.0, s)));
+    // Light that the teeth and the lining pass on to each other fills the shade of the lip in front; the cheeks close
+    // in on the side teeth (the buccal corridor), which a smile should hint at and no more.
+    (*surface).occlusion = max((*surface).occlusion, mix(0.80, 0.12, smoothstep(7.0, 32.0, s)));
+    // They mirror and take on the red of the cheek that lies against them.
+    (*surface).albedo = mix((*surface).albedo, vec3f(0.20, 0.075, 0.065), 0.9 * smoothstep(13.0, 26.0, s));
+    (*surface).specular *= mix(1.0, 0.04, smoothstep(13.0, 24.0, s));
 }

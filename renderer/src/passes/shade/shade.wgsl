@@ -34,7 +34,8 @@ struct Params {
     transmit_per_mm: f32,
     // 1 where differences of normals add instead of slopes.
     adds_differences: u32,
-    padding: u32,
+    // Diameter of the pupils, millimetres.
+    pupil_mm: f32,
     // Radii of the taps and outer edges of the rings around the ray of a light, mm.
     ring_taps_mm: vec4f,
     ring_ends_mm: vec4f,
@@ -251,7 +252,8 @@ fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f
             surface.albedo = vec3f(0.30, 0.085, 0.078);
             surface.specular = 0.5;
             surface.roughness = 0.22;
-            surface.occlusion *= surface.occlusion * surface.occlusion;
+            // Deep, but never black: red light is passed on from wall to wall.
+            surface.occlusion = max(surface.occlusion * surface.occlusion * surface.occlusion, 0.10);
         }
         default: {
             surface.albedo = vec3f(0.2);
@@ -264,6 +266,10 @@ fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f
     }
     return surface;
 }
+
+// Pixels that relief is averaged over: a highlight answers slopes so steeply that one pixel's mean still glitters
+// (Kaplanyan et al. 2016 take a Gaussian of half a pixel's deviation, about this wide).
+const RELIEF_FOOTPRINT = 1.6;
 
 // Weighted slopes of all wrinkle maps (papers/004 section 8.2).
 fn wrinkle_slopes(uv: vec2f, duv_dx: vec2f, duv_dy: vec2f) -> vec2f {
@@ -313,9 +319,11 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
         return;
     }
     let map = textureSampleGrad(skin_map, trilinear_repeat, uv, duv_dx, duv_dy);
-    let fine = textureSampleGrad(slope_map, trilinear_repeat, uv, duv_dx, duv_dy);
+    let fine = textureSampleGrad(slope_map, trilinear_repeat, uv, RELIEF_FOOTPRINT * duv_dx, RELIEF_FOOTPRINT * duv_dy);
     var slopes = params.slope_scale * fine.xy;
-    let micro = micro_relief(uv, duv_dx, duv_dy);
+    let gloss = textureSampleGrad(gloss_map, trilinear_repeat, uv, duv_dx, duv_dy);
+    // Lips have lines of their own and no net of furrows; they are what shines most.
+    let micro = micro_relief(uv, duv_dx, duv_dy) * smoothstep(0.60, 0.53, gloss.r);
     if params.adds_differences == 0u {
         slopes += wrinkle_slopes(uv, duv_dx, duv_dy);
         slopes += params.slope_scale * micro.xy;
@@ -336,7 +344,6 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
 
     (*surface).albedo = mix((*surface).albedo, params.hair_color.rgb, map.a);
 
-    let gloss = textureSampleGrad(gloss_map, trilinear_repeat, uv, duv_dx, duv_dy);
     (*surface).specular = gloss.r;
     // Slope variance that the mip level hides is roughness (Toksvig 2005; for Beckmann m^2 = 2 sigma^2).
     let variance = square(params.slope_scale) * (fine.z + micro.z);

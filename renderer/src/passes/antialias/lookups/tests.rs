@@ -127,7 +127,7 @@ fn stairs_have_the_area_under_their_line() {
             // The same area by counting points.
             let points = 200;
             let (fx, fy) = DIAGONAL_OFFSETS[block];
-            let start = if before % 2 == 0 { 0.5 } else { -0.5 };
+            let start = if before.is_multiple_of(2) { 0.5 } else { -0.5 };
             let (length, shift) = ((before + after + 1) as f64, fy - fx);
             let counted = (0..points * points)
                 .filter(|i| {
