@@ -153,7 +153,7 @@ fn key(state: &EnvironmentState) -> String {
 fn load_map(path: &str) -> Outcome<EnvironmentMap> {
     let wrong = |e: &dyn std::fmt::Display| {
         let names = EnvironmentMap::NAMES.map(|n| format!("{n:?}")).join(", ");
-        Failure::input(format!("environment {path:?}: {e}")).hint(&format!(
+        Failure::input(format!("environment {path:?}: {e}")).hint(format!(
             "built in are {names}; anything else is the path of an equirectangular .hdr or .exr image"
         ))
     };

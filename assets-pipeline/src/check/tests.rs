@@ -223,7 +223,7 @@ fn usd_layers_and_what_breaks_them() {
     broken("/Surface.outputs", "/Surfaces.outputs", "Surfaces, which is not there");
     broken("float inputs:metallic = 0", "asset inputs:file = @../x.png@", "leaves the folder");
     broken("float inputs:metallic = 0", "asset inputs:file = @x.png@", "there is no file");
-    broken("def Scope", "dif Scope", "found \"{\"");
+    broken("def Scope", "dif Scope", "expected a property");
     for cut in (0..layer.len()).step_by(37) {
         assert!(!check(&layer[..cut]).is_empty() || layer[cut..].trim().is_empty(), "cut at {cut}");
     }
