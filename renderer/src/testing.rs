@@ -38,8 +38,10 @@ pub(crate) fn assert_layout(wgsl: &str, structure: &str, size: usize, fields: &[
     assert_eq!(members, fields, "fields of {structure}");
 }
 
-/// What shaders of the project may use; only one, beside another without, uses numbers of triangles.
-const CAPABILITIES: naga::valid::Capabilities = naga::valid::Capabilities::PRIMITIVE_INDEX;
+/// What shaders of the project may use: halves that are packed in words, and numbers of triangles (of which there is a
+/// version without).
+const CAPABILITIES: naga::valid::Capabilities =
+    naga::valid::Capabilities::PRIMITIVE_INDEX.union(naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32);
 
 /// Parses and validates a shader and returns the workgroup size of each of its compute entry points.
 pub(crate) fn validated_workgroups(wgsl: &str) -> Vec<(String, [u32; 3])> {

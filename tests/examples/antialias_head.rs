@@ -34,9 +34,9 @@ fn settings(mode: Mode, supersampling: u32) -> Settings {
         // What scatters has no edges.
         scatter: ScatterMethod::None,
         transmit: TransmitMethod::None,
+        appearance: AppearanceMethods::default(),
         profile: Arc::new(Profile::deon_six()),
         antialias: antialias::Settings::new(mode, Preset::High),
-        appearance: AppearanceMethods::default(),
         supersampling,
         shadow_size: 512,
         exposure: 1.8,

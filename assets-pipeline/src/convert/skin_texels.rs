@@ -92,9 +92,33 @@ impl<'a> SkinTexels<'a> {
                 }
             }
         }
-        fill_unmapped(&mut map, &self.mask());
+        let mut mask = self.mask();
+        // Filtering at the edge of the skin reads one texel beyond it.
+        for (i, value) in edge_values(&map, &mask) {
+            map.values[i] = value;
+            mask.mapped[i] = true;
+        }
+        fill_unmapped(&mut map, &mask);
         map
     }
+}
+
+/// Texels without data that touch some, with the mean of those.
+fn edge_values(map: &Map, mask: &Mask) -> Vec<(usize, f32)> {
+    let (width, height) = (map.width as usize, map.height as usize);
+    let around = |i: usize| i.saturating_sub(1)..=i + 1;
+    (0..width * height)
+        .filter(|i| !mask.mapped[*i])
+        .filter_map(|i| {
+            let (x, y) = (i % width, i / width);
+            let neighbours = around(y).filter(|y| *y < height).flat_map(|y| around(x).map(move |x| (x, y)));
+            let known = neighbours.filter(|(x, _)| *x < width).map(|(x, y)| y * width + x);
+            let (count, sum) = known
+                .filter(|j| mask.mapped[*j])
+                .fold((0.0, 0.0), |(count, sum), j| (count + 1.0, sum + map.values[j]));
+            (count > 0.0).then(|| (i, sum / count))
+        })
+        .collect()
 }
 
 /// Calls `inside` with the texels of a triangle (corners in texels) and their signed distance to its edges, 0 inside.
@@ -193,7 +217,8 @@ pub(super) mod tests {
         for x in 0..16u32 {
             assert!((map.texel(x, 9)[0] - (x as f32 + 0.5) / 16.0).abs() < 1e-5);
         }
-        assert!(map.texel(31, 9)[0] > 0.5);
+        assert!((map.texel(16, 9)[0] - 15.5 / 16.0).abs() < 1e-5);
+        assert!(map.texel(31, 9)[0] > 0.9);
     }
 
     #[test]

@@ -119,9 +119,13 @@ fn albedo_goes_to_chromophores_and_back() {
         .collect();
     let mean = differences.iter().sum::<f64>() / differences.len() as f64;
     assert!(mean < 0.3, "{mean}");
-    for (a, b) in melanin.values.iter().zip(&found.melanin.values) {
-        // Pale skin hardly shows its melanin, and least beside much blood: codes of 8 bits leave 2e-3 open.
-        assert!((a - b).abs() < 0.05 * a + 2e-3, "{a} {b}");
+    let codes = |c: &[f32]| [c[0], c[1], c[2]].map(|v| (srgb_encode(v) * 255.0).round());
+    let colors = albedo.values.chunks_exact(3).zip(back.values.chunks_exact(3));
+    for ((a, b), (before, after)) in melanin.values.iter().zip(&found.melanin.values).zip(colors) {
+        // Pale skin hardly shows its melanin, and least beside much blood: no inversion can tell apart what has the same
+        // 8-bit codes or the next ones.
+        let is_next = codes(before).into_iter().zip(codes(after)).all(|(p, q)| (p - q).abs() <= 1.0);
+        assert!((a - b).abs() < 0.05 * a + 2e-3 || is_next, "{a} {b}");
     }
 }
 

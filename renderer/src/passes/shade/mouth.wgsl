@@ -51,7 +51,8 @@ fn teeth(surface: ptr<function, Surface>, uv: vec2f, tangent: vec3f, bitangent: 
     (*surface).normal = normalize((*surface).normal + slope * tangent + fall * bitangent);
     // Light that the teeth and the lining pass on to each other fills the shade of the lip in front; the cheeks close
     // in on the side teeth (the buccal corridor), which a smile should hint at and no more.
-    (*surface).occlusion = max((*surface).occlusion, mix(0.80, 0.02, smoothstep(7.0, 32.0, s)));
-    (*surface).albedo *= mix(1.0, 0.14, smoothstep(13.0, 26.0, s));
+    (*surface).occlusion = max((*surface).occlusion, mix(0.80, 0.12, smoothstep(7.0, 32.0, s)));
+    // They mirror and take on the red of the cheek that lies against them.
+    (*surface).albedo = mix((*surface).albedo, vec3f(0.20, 0.075, 0.065), 0.9 * smoothstep(13.0, 26.0, s));
     (*surface).specular *= mix(1.0, 0.04, smoothstep(13.0, 24.0, s));
 }
