@@ -267,6 +267,27 @@ fn rigs_and_inbetweens_survive_a_baked_performance() {
 }
 
 #[test]
+fn what_the_living_do_is_keyed_at_frames() {
+    let head = head();
+    let rig = Rig::default();
+    let text = r#"{"fps": 24, "duration": 1, "life": {"seed": 3, "sway": 1, "breathing": 1},
+        "head": {"yawDegrees": [{"t": 0, "v": 0, "ease": "smooth"}, {"t": 1, "v": 9}]}}"#;
+    let sequence = Sequence::from_json("s.json", text).unwrap();
+    let performance = Performance { rig: &rig, sequence: &sequence };
+    let scene = write::to_scene(&head, Some(performance), &write::Options::default(), "t").unwrap();
+    let read = read::from_bytes(scene.text.as_bytes(), Path::new("/nowhere/t.ma"), &read::Options::default());
+    let back = read.unwrap().sequence.unwrap();
+    let alive = sequence.life.as_ref().unwrap();
+    assert!(alive.at(0.5).head_degrees[1] != 0.0 && alive.at(0.5).translation != [0.0; 3]);
+    for frame in 0..24 {
+        let t = f64::from(frame) / 24.0;
+        let yaw = sequence.head.yaw_degrees.at(t) + alive.at(t).head_degrees[0];
+        assert!((back.head.yaw_degrees.at(t) - yaw).abs() < 1e-4, "{t}");
+        assert!((back.head.translation.at(t)[1] - alive.at(t).translation[1]).abs() < 1e-7, "{t}");
+    }
+}
+
+#[test]
 fn expressions_are_baked_with_the_colour_of_the_skin() {
     let head = head();
     let rig = Rig::from_json(

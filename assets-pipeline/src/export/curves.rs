@@ -48,6 +48,15 @@ impl Breaks {
         }
     }
 
+    /// Adds every frame: what happens between keys (a saccade takes less than one) is not overlooked.
+    pub fn add_frames(&mut self, fps: f64) {
+        let mut frame = 1.0;
+        while frame / fps < self.end_s {
+            self.insert(frame / fps, false);
+            frame += 1.0;
+        }
+    }
+
     fn insert(&mut self, time_s: f64, jump: bool) {
         if time_s > 0.0 && time_s <= self.end_s {
             *self.times.entry(time_s.to_bits()).or_default() |= jump;

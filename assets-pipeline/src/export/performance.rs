@@ -59,9 +59,15 @@ impl PerformanceCurves {
         let with = |tracks: &[&rubor_rig::timeline::Track<f32>]| {
             let mut breaks = Breaks::new(sequence.duration);
             tracks.iter().for_each(|t| breaks.add(t));
+            // Nobody keys what the living do.
+            if sequence.life.is_some() {
+                breaks.add_frames(sequence.fps);
+            }
             breaks
         };
-        let moving: Vec<_> = sequence.expressions.values().chain(sequence.shapes.values()).collect();
+        let gaze = sequence.eyes.iter().flat_map(|eyes| [&eyes.yaw_degrees, &eyes.pitch_degrees]);
+        let moving: Vec<_> =
+            sequence.expressions.values().chain(sequence.shapes.values()).chain(gaze).collect();
         let weights = |t: f64| {
             let shapes = face(t).shapes;
             kept.iter().map(|i| shapes[*i]).collect()
@@ -69,7 +75,7 @@ impl PerformanceCurves {
         let motion = &sequence.head;
         let turning = [&motion.yaw_degrees, &motion.pitch_degrees, &motion.roll_degrees];
         let rotation = |t: f64| face(t).head_rotation.to_array().to_vec();
-        let mut shifting = Breaks::new(sequence.duration);
+        let mut shifting = with(&[]);
         shifting.add(&motion.translation);
         let translation = |t: f64| face(t).head_translation.to_array().to_vec();
         Self {

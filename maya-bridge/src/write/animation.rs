@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::head::Head;
+use rubor_rig::life::{Life, Motion};
 use rubor_rig::names::Resolver;
 use rubor_rig::timeline::{Ease, Key, Sequence, Track, TrackValue};
 
@@ -29,6 +30,9 @@ pub(super) struct Animation {
 /// True where weights of shapes are not simply the tracks of the sequence.
 pub(super) fn needs_bake(head: &Head, performance: Performance<'_>) -> bool {
     let sequence = performance.sequence;
+    if sequence.life.is_some() || sequence.eyes.is_some() {
+        return true;
+    }
     let drives = |track: &Track<f32>| *track != Track::Constant(0.0);
     if sequence.expressions.values().chain(sequence.states.values()).any(drives) {
         return true;
@@ -68,6 +72,9 @@ impl Animation {
             frame_count: sequence.frame_count(),
             fps: sequence.fps,
         };
+        if let Some(life) = &sequence.life {
+            animation.live(life);
+        }
         if baked {
             animation.bake(head, &evaluator);
             notes.push("expressions are written as weights of shapes at every frame".into());
@@ -84,6 +91,23 @@ impl Animation {
                 self.weights.insert(target.index as usize, track.clone());
             }
         }
+    }
+
+    /// Head motion with breath and sway, at every frame.
+    fn live(&mut self, life: &Life) {
+        let times: Vec<f64> = (0..self.frame_count).map(|i| f64::from(i) / self.fps).collect();
+        let (motions, fps): (Vec<_>, f64) = (times.iter().map(|t| life.at(*t)).collect(), self.fps);
+        for (k, track) in [&mut self.yaw, &mut self.pitch, &mut self.roll].into_iter().enumerate() {
+            let values: Vec<f32> =
+                times.iter().zip(&motions).map(|(t, m)| track.at(*t) + m.head_degrees[k]).collect();
+            *track = keyed(&values, fps);
+        }
+        let place = |(i, (t, m)): (usize, (&f64, &Motion))| {
+            let keyed = self.translation.at(*t);
+            let v = std::array::from_fn(|k| keyed[k] + m.translation[k]);
+            Key { t: i as f64 / fps, v, ease: Ease::Linear }
+        };
+        self.translation = Track::Keys(times.iter().zip(&motions).enumerate().map(place).collect());
     }
 
     fn bake(&mut self, head: &Head, evaluator: &Evaluator) {

@@ -228,11 +228,24 @@ fn targets(
 /// Translation and rotation of the head; roll acts first, then pitch, then yaw.
 fn motion(out: &mut String, sequence: &Sequence, frames: usize, tolerance: f32) {
     let head = &sequence.head;
+    let alive = |t: f64| sequence.life.as_ref().map(|life| life.at(t)).unwrap_or_default();
     let times = || (0..frames).map(|i| sequence.frame_time_s(i as u32));
     let angles: Vec<Vec<f32>> = times()
-        .map(|t| vec![head.pitch_degrees.at(t), head.yaw_degrees.at(t), head.roll_degrees.at(t)])
+        .map(|t| {
+            let [yaw, pitch, roll] = alive(t).head_degrees;
+            vec![
+                head.pitch_degrees.at(t) + pitch,
+                head.yaw_degrees.at(t) + yaw,
+                head.roll_degrees.at(t) + roll,
+            ]
+        })
         .collect();
-    let places: Vec<Vec<f32>> = times().map(|t| head.translation.at(t).to_vec()).collect();
+    let places: Vec<Vec<f32>> = times()
+        .map(|t| {
+            let (keyed, own) = (head.translation.at(t), alive(t).translation);
+            (0..3).map(|k| keyed[k] + own[k]).collect()
+        })
+        .collect();
     let mut order = Vec::new();
     // A weight moves points by centimetres; a degree by millimetres.
     for (name, kind, values, scale) in
