@@ -26,6 +26,7 @@ mod gpu;
 mod head;
 mod pass_timer;
 mod passes;
+mod placement;
 mod scene;
 mod targets;
 #[cfg(test)]
