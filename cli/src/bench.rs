@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
     /// Frames before them that are not
-    #[arg(long, default_value_t = 50)]
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(..=10_000))]
     warm_up: u32,
     /// Factor of the light before the tone map
     #[arg(long, default_value_t = 1.8)]

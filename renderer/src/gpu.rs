@@ -74,6 +74,19 @@ pub fn list_adapters() -> Vec<AdapterDescription> {
     adapters().iter().enumerate().map(|(i, a)| describe(i, a)).collect()
 }
 
+/// What pipelines that rasterise differ in.
+pub(crate) struct Raster<'a> {
+    pub(crate) label: &'a str,
+    pub(crate) wgsl: &'a str,
+    /// Entry points; without a fragment only depth is written.
+    pub(crate) vertex: &'a str,
+    pub(crate) fragment: Option<&'a str>,
+    pub(crate) targets: &'a [Option<wgpu::ColorTargetState>],
+    /// What depth has to be, compared with the one that is there.
+    pub(crate) nearer: wgpu::CompareFunction,
+    pub(crate) writes_depth: bool,
+}
+
 /// Features that are used where the adapter has them; nothing needs them.
 const WELCOME_FEATURES: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::PRIMITIVE_INDEX);
@@ -184,6 +197,40 @@ impl Gpu {
                 zero_initialize_workgroup_memory: false,
                 ..Default::default()
             },
+            cache: None,
+        })
+    }
+
+    /// A pipeline that rasterises triangle lists without vertex buffers, whose bindings are those that the shader
+    /// declares.
+    pub(crate) fn raster_pipeline(&self, raster: &Raster<'_>) -> wgpu::RenderPipeline {
+        let module = self.shader(raster.label, raster.wgsl);
+        let fragment = raster.fragment.map(|entry| wgpu::FragmentState {
+            module: &module,
+            entry_point: Some(entry),
+            compilation_options: Default::default(),
+            targets: raster.targets,
+        });
+        self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(raster.label),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some(raster.vertex),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: wgpu::TextureFormat::Depth32Float,
+                depth_write_enabled: Some(raster.writes_depth),
+                depth_compare: Some(raster.nearer),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment,
+            multiview_mask: None,
             cache: None,
         })
     }

@@ -48,18 +48,8 @@ pub(crate) fn upload_half_channels<const N: usize>(
     size: [u32; 2],
     layers: &[Vec<Vec<Texel>>],
 ) -> wgpu::TextureView {
-    use wgpu::TextureFormat as F;
-    let format = const {
-        match N {
-            1 => F::R16Float,
-            2 => F::Rg16Float,
-            _ => F::Rgba16Float,
-        }
-    };
-    upload(gpu, label, size, layers, format, &|texels| {
-        let first = |t: &Texel| std::array::from_fn::<f16, N, _>(|c| f16::from_f32(t[c]));
-        texels.par_iter().with_min_len(4096).flat_map_iter(first).collect::<Vec<_>>()
-    })
+    use wgpu::TextureFormat::{R16Float, Rg16Float, Rgba16Float};
+    upload_channels::<N, f16>(gpu, label, size, layers, [R16Float, Rg16Float, Rgba16Float], f16::from_f32)
 }
 
 /// A texture array of 8-bit values 0 to 1 with the first 1, 2 or 4 channels; `layers[layer][level][texel]`.
@@ -69,17 +59,23 @@ pub(crate) fn upload_bytes<const N: usize>(
     size: [u32; 2],
     layers: &[Vec<Vec<Texel>>],
 ) -> wgpu::TextureView {
-    use wgpu::TextureFormat as F;
-    let format = const {
-        match N {
-            1 => F::R8Unorm,
-            2 => F::Rg8Unorm,
-            _ => F::Rgba8Unorm,
-        }
-    };
+    use wgpu::TextureFormat::{R8Unorm, Rg8Unorm, Rgba8Unorm};
+    let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+    upload_channels::<N, u8>(gpu, label, size, layers, [R8Unorm, Rg8Unorm, Rgba8Unorm], byte)
+}
+
+/// The first N channels of texels; `formats` are those of 1, 2 and 4.
+fn upload_channels<const N: usize, T: bytemuck::Pod + Send + Sync>(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 2],
+    layers: &[Vec<Vec<Texel>>],
+    formats: [wgpu::TextureFormat; 3],
+    encode: impl Fn(f32) -> T + Sync,
+) -> wgpu::TextureView {
+    let format = formats[const { if N < 4 { N - 1 } else { 2 } }];
     upload(gpu, label, size, layers, format, &|texels| {
-        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
-        let first = |t: &Texel| std::array::from_fn::<u8, N, _>(|c| byte(t[c]));
+        let first = |t: &Texel| std::array::from_fn::<T, N, _>(|c| encode(t[c]));
         texels.par_iter().with_min_len(4096).flat_map_iter(first).collect::<Vec<_>>()
     })
 }

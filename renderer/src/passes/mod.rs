@@ -16,3 +16,12 @@ pub(crate) mod visibility;
 
 /// Pixels on a side of what a workgroup of blocks.wgsl does.
 pub(crate) const BLOCK_GROUP: u32 = 16;
+
+/// A half float image that premultiplied colours are drawn over.
+pub(crate) fn blended() -> wgpu::ColorTargetState {
+    wgpu::ColorTargetState {
+        format: wgpu::TextureFormat::Rgba16Float,
+        blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+        write_mask: wgpu::ColorWrites::COLOR,
+    }
+}

@@ -20,9 +20,10 @@ use glam::Vec3;
 pub(crate) use roots::Root;
 pub(crate) use roots::roots;
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, Raster};
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
+use crate::passes::blended;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(
@@ -45,37 +46,14 @@ pub(crate) struct CroppedHair {
 
 impl CroppedHair {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let module = gpu.shader("cropped hair", SHADER);
-        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("cropped hair"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("cropped_hair_vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: wgpu::TextureFormat::Depth32Float,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("cropped_hair_fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(wgpu::ColorTargetState {
-                    format: wgpu::TextureFormat::Rgba16Float,
-                    blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-                    write_mask: wgpu::ColorWrites::COLOR,
-                })],
-            }),
-            multiview_mask: None,
-            cache: None,
+        let pipeline = gpu.raster_pipeline(&Raster {
+            label: "cropped hair",
+            wgsl: SHADER,
+            vertex: "cropped_hair_vertex",
+            fragment: Some("cropped_hair_fragment"),
+            targets: &[Some(blended())],
+            nearer: wgpu::CompareFunction::Greater,
+            writes_depth: false,
         });
         Self { pipeline }
     }

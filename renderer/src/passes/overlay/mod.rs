@@ -14,9 +14,10 @@
 
 use glam::Vec3;
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, Raster};
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
+use crate::passes::blended;
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(
@@ -51,40 +52,17 @@ pub(crate) struct Overlaid<'a> {
 
 impl Overlay {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let module = gpu.shader("overlay", SHADER);
-        let target = Some(wgpu::ColorTargetState {
-            format: wgpu::TextureFormat::Rgba16Float,
-            blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-            write_mask: wgpu::ColorWrites::COLOR,
-        });
+        let target = Some(blended());
         let targets = [target.clone(), target];
         let pipeline = |targets: &[Option<wgpu::ColorTargetState>]| {
-            gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some("overlay"),
-                layout: None,
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some("overlay_vertex"),
-                    compilation_options: Default::default(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: Some(wgpu::DepthStencilState {
-                    format: wgpu::TextureFormat::Depth32Float,
-                    depth_write_enabled: Some(false),
-                    depth_compare: Some(wgpu::CompareFunction::Greater),
-                    stencil: Default::default(),
-                    bias: Default::default(),
-                }),
-                multisample: Default::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some("overlay_fragment"),
-                    compilation_options: Default::default(),
-                    targets,
-                }),
-                multiview_mask: None,
-                cache: None,
+            gpu.raster_pipeline(&Raster {
+                label: "overlay",
+                wgsl: SHADER,
+                vertex: "overlay_vertex",
+                fragment: Some("overlay_fragment"),
+                targets,
+                nearer: wgpu::CompareFunction::Greater,
+                writes_depth: false,
             })
         };
         Self { pipelines: [pipeline(&targets[..1]), pipeline(&targets)] }

@@ -13,7 +13,7 @@ use glam::camera::rh::{proj, view};
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use crate::clusters::Sphere;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, Raster};
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
 use crate::scene::LightKind;
@@ -120,28 +120,14 @@ pub(crate) struct Shadow {
 
 impl Shadow {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let module = gpu.shader("shadow", SHADER);
-        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("shadow"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("shadow_vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: wgpu::TextureFormat::Depth32Float,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Less),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: Default::default(),
+        let pipeline = gpu.raster_pipeline(&Raster {
+            label: "shadow",
+            wgsl: SHADER,
+            vertex: "shadow_vertex",
             fragment: None,
-            multiview_mask: None,
-            cache: None,
+            targets: &[],
+            nearer: wgpu::CompareFunction::Less,
+            writes_depth: true,
         });
         Self { pipeline }
     }

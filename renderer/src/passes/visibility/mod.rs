@@ -8,7 +8,7 @@
 //! its fragment shader stores one integer, everything else is compute (see ARCHITECTURE.md for what that saves).
 //! Reversed infinite depth keeps 24 bits at any distance (Lapidous and Jiao 1999).
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, Raster};
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
 
@@ -37,33 +37,14 @@ impl Visibility {
 
     /// Both ways give the same image.
     pub(crate) fn with_numbers(gpu: &Gpu, is_numbered: bool) -> Self {
-        let module = gpu.shader("visibility", &shader(is_numbered));
-        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("visibility"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("visibility_vertex"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: wgpu::TextureFormat::Depth32Float,
-                depth_write_enabled: Some(true),
-                depth_compare: Some(wgpu::CompareFunction::Greater),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("visibility_fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
+        let pipeline = gpu.raster_pipeline(&Raster {
+            label: "visibility",
+            wgsl: &shader(is_numbered),
+            vertex: "visibility_vertex",
+            fragment: Some("visibility_fragment"),
+            targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
+            nearer: wgpu::CompareFunction::Greater,
+            writes_depth: true,
         });
         Self { pipeline, is_numbered }
     }
