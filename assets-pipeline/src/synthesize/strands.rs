@@ -266,7 +266,7 @@ mod tests {
             name: "jawOpen".into(),
             points: vec![2, 3],
             offsets: vec![Vec3::Z; 2],
-            occlusion: vec![change(0), change(3)],
+            occlusion: vec![change(0), change(2), change(3)],
         };
         Head { mesh, shapes: vec![lift], ..Head::default() }
     }
@@ -303,6 +303,6 @@ mod tests {
         head.validate().unwrap();
         assert_eq!((head.mesh.points.len(), head.mesh.triangles.len()), (3, 1));
         assert_eq!(head.shapes[0].points, [2]);
-        assert_eq!(head.shapes[0].occlusion.iter().map(|c| c.point).collect::<Vec<_>>(), [0]);
+        assert_eq!(head.shapes[0].occlusion.iter().map(|c| c.point).collect::<Vec<_>>(), [0, 2]);
     }
 }

@@ -86,6 +86,18 @@ fn mean(of_cosines: &[[f32; 4]]) -> [f32; 4] {
     sum
 }
 
+/// What enters skin from a lamp at a cosine over what enters of an even sky, for tests: the factor of shade.wgsl.
+#[cfg(test)]
+pub(crate) fn entering(specular: f32, roughness: f32, cosine: f32) -> f64 {
+    let rho = |cosine: f32| {
+        let [scale, bias] = scale_and_bias(roughness, cosine);
+        f64::from(specular * (0.028 * scale + bias))
+    };
+    let n = 200;
+    let mean = (0..n).map(|i| (i as f32 + 0.5) / n as f32).map(|c| 2.0 * f64::from(c) * rho(c) / f64::from(n));
+    (1.0 - rho(cosine)) / (1.0 - mean.sum::<f64>())
+}
+
 /// The lobe over f0 = 1 without Fresnel, for tests: D / |L + V|^2.
 #[cfg(test)]
 fn lobe(light: Vec3, viewer: Vec3, roughness: f32) -> f32 {

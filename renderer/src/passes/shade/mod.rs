@@ -41,7 +41,7 @@
 //!
 //! Does not: reflect one part of the head in another.
 
-mod directional_albedo;
+pub(crate) mod directional_albedo;
 
 use std::fmt;
 use std::str::FromStr;
