@@ -94,7 +94,8 @@ pub(crate) fn entering(specular: f32, roughness: f32, cosine: f32) -> f64 {
         f64::from(specular * (0.028 * scale + bias))
     };
     let n = 200;
-    let mean = (0..n).map(|i| (i as f32 + 0.5) / n as f32).map(|c| 2.0 * f64::from(c) * rho(c) / f64::from(n));
+    let mean =
+        (0..n).map(|i| (i as f32 + 0.5) / n as f32).map(|c| 2.0 * f64::from(c) * rho(c) / f64::from(n));
     (1.0 - rho(cosine)) / (1.0 - mean.sum::<f64>())
 }
 
