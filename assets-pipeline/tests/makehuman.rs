@@ -116,7 +116,7 @@ fn ambient_visibility_follows_jaw_and_lids() {
         let squares: Vec<f32> = squares.collect();
         (squares.iter().sum::<f32>() / squares.len() as f32).sqrt()
     };
-    // Weights of jaw and blinks; bounds as in docs/occlusion.md.
+    // Weights of jaw and blinks. The same rays, so no noise: what is left are small changes and what is between weights.
     for (jaw, blink) in [(0.0, 0.0), (1.0, 0.0), (0.75, 0.0), (0.5, 1.0)] {
         let mut weights = vec![0.0; head.shapes.len()];
         weights[head.shape_index("jawOpen").unwrap()] = jaw;
@@ -127,6 +127,6 @@ fn ambient_visibility_follows_jaw_and_lids() {
         let blended = blend_occlusion(&head.mesh, &head.shapes, &weights);
         let (error, still) = (rms(&blended, &posed.mesh.occlusion), rms(&rest, &posed.mesh.occlusion));
         println!("jaw {jaw}, lids {blink}: {error:.4}, as at rest {still:.4}");
-        assert!(error < 0.03 && error <= 0.5 * still, "jaw {jaw}, lids {blink}: {error} of {still}");
+        assert!(error < 0.01 && error <= 0.5 * still, "jaw {jaw}, lids {blink}: {error} of {still}");
     }
 }
