@@ -31,9 +31,8 @@ const BROWN: [f64; 3] = [0.0186, 0.0115, 0.0066];
 
 #[test]
 fn the_light_of_hair_is_laid_out_alike_on_both_sides() {
-    let wgsl = concat!(include_str!("../../shared/view.wgsl"), fibre_wgsl!());
     assert_layout(
-        wgsl,
+        crate::passes::cropped_hair::SHADER,
         "HairLight",
         size_of::<HairLight>(),
         &offsets!(HairLight; environment_intensity as "environment_intensity",

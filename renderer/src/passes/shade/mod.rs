@@ -35,6 +35,8 @@
 //! Does not: reflect one part of the head in another; carry light between parts of an eye or the mouth.
 
 mod directional_albedo;
+#[cfg(test)]
+mod tests;
 
 use std::fmt;
 use std::str::FromStr;
