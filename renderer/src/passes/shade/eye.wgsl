@@ -68,21 +68,20 @@ fn shows(pixel: vec2f, materials: u32) -> bool {
 // Shadow on what light spreads in: its mean over a disc of that radius on the surface, whose taps are turned
 // evenly so that their noise cancels.
 fn spread_shadow(light: Light, surface: Surface, lit: Arriving, turn: f32) -> f32 {
-    if surface.spread_mm <= 0.0 {
-        return shadow(light, surface, lit, turn);
-    }
     var moved = surface;
     let side = normalize(cross(surface.facet, select(vec3f(0.0, 1.0, 0.0), vec3f(1.0, 0.0, 0.0), abs(surface.facet.y) > 0.9)));
     let other = cross(surface.facet, side);
+    // One loop for both: processors that run branches of a group in step would else pay twice.
+    let taps = select(1u, SPREAD_TAPS, surface.spread_mm > 0.0);
     var sum = 0.0;
-    for (var i = 0u; i < SPREAD_TAPS; i++) {
-        let offset = 0.001 * surface.spread_mm * vogel_disk(i, SPREAD_TAPS, turn);
+    for (var i = 0u; i < taps; i++) {
+        let offset = 0.001 * surface.spread_mm * vogel_disk(i, taps, turn);
         let way = offset.x * side + offset.y * other;
         moved.position = surface.position + way;
         moved.lifted = surface.lifted + way;
-        sum += shadow(light, moved, lit, turn + 2.0 * PI * f32(i) / f32(SPREAD_TAPS));
+        sum += shadow(light, moved, lit, turn + 2.0 * PI * f32(i) / f32(taps));
     }
-    return sum / f32(SPREAD_TAPS);
+    return sum / f32(taps);
 }
 
 const SPREAD_TAPS = 6u;
