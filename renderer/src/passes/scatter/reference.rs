@@ -56,15 +56,25 @@ impl Frame {
     }
 
     fn per_mm(&self, i: usize) -> f64 {
-        self.focal_px / self.depth_of_slopes(i)
+        self.focal_px / self.depth_in_view(i).unwrap_or(self.depth_mm[i])
     }
 
-    /// Depth as slopes go by: of a halved image that of the view where it is of the same surface.
-    fn depth_of_slopes(&self, i: usize) -> f64 {
-        let Some((view, level)) = &self.view else { return self.depth_mm[i] };
-        let middle = |at: usize| ((at << level) + (1 << (level - 1))) as i64;
-        let there = view.depth_mm[view.index(middle(i % self.width), middle(i / self.width))];
-        if (there - self.depth_mm[i]).abs() < ONE_SURFACE_MM { there } else { self.depth_mm[i] }
+    /// The view, and where the middle of a pixel is in it.
+    fn in_view(&self, x: i64, y: i64) -> (&Self, i64, i64) {
+        match &self.view {
+            None => (self, x, y),
+            Some((view, level)) => {
+                let middle = |at: i64| (at << level) + (1 << (level - 1));
+                (view, middle(x), middle(y))
+            }
+        }
+    }
+
+    /// Depth as slopes go by, where the view shows the same surface as a halved image.
+    fn depth_in_view(&self, i: usize) -> Option<f64> {
+        let (view, x, y) = self.in_view((i % self.width) as i64, (i / self.width) as i64);
+        let there = view.depth_mm[view.index(x, y)];
+        (self.view.is_none() || (there - self.depth_mm[i]).abs() < ONE_SURFACE_MM).then_some(there)
     }
 
     fn is_sharp(&self, i: usize, visible_mm: f64) -> bool {
@@ -75,20 +85,17 @@ impl Frame {
 
     /// Depth change to the next pixel along an axis: the smaller of both sides, 0 where the surface breaks.
     fn slope(&self, x: i64, y: i64, axis: usize) -> f64 {
-        let here = self.depth_of_slopes(self.index(x, y));
-        let along = |step: i64| {
-            let (dx, dy) = if axis == 0 { (step, 0) } else { (0, step) };
-            match &self.view {
-                None => self.depth_mm[self.index(x + dx, y + dy)],
-                Some((view, level)) => {
-                    let middle = |at: i64, d: i64| ((at + d) << level) + (1 << (level - 1));
-                    view.depth_mm[view.index(middle(x, dx), middle(y, dy))]
-                }
-            }
-        };
-        let (before, after) = (here - along(-1), along(1) - here);
+        let Some(here) = self.depth_in_view(self.index(x, y)) else { return 0.0 };
+        let (view, x, y) = self.in_view(x, y);
+        let (dx, dy) = if axis == 0 { (1, 0) } else { (0, 1) };
+        let before = here - view.depth_mm[view.index(x - dx, y - dy)];
+        let after = view.depth_mm[view.index(x + dx, y + dy)] - here;
         let slope = if before.abs() < after.abs() { before } else { after };
-        if slope.abs() * self.per_mm(self.index(x, y)) <= 4.0 { slope } else { 0.0 }
+        if slope.abs() * view.focal_px / here > 4.0 {
+            return 0.0;
+        }
+        // To the next pixel of this image.
+        slope * view.focal_px / self.focal_px
     }
 
     fn center(&self, x: i64, y: i64) -> Center {
@@ -133,8 +140,8 @@ impl Frame {
                     let between = |p: f64, q: f64| p + (along - low) * (q - p);
                     let depth = between(self.relative_mm(a), self.relative_mm(b));
                     let plane = center.relative_mm + center.slope[axis] * along;
-                    let is_on_plane =
-                        (depth - plane).abs() <= PLANE_MM.max(CURVATURE_PER_MM * offset_mm * offset_mm);
+                    let is_on_plane = self.view.is_none()
+                        && (depth - plane).abs() <= PLANE_MM.max(CURVATURE_PER_MM * offset_mm * offset_mm);
                     let place = |pixel: f64| if axis == 0 { [pixel, 0.0] } else { [0.0, pixel] };
                     let texel = |i: usize, pixel: f64, c: usize| {
                         Self::arrives(&center, self.relative_mm(i), place(pixel))

@@ -268,7 +268,7 @@ fn shaders_and_structs_are_what_both_sides_count_on() {
             assert_eq!(validated_workgroups(&shader), [("scatter".into(), [128, 1, 1])]);
         }
     }
-    assert_eq!(validated_workgroups(gauss::HALVE), [("halve".into(), [8, 8, 1])]);
+    assert_eq!(validated_workgroups(gauss::HALVE), [("halve".into(), [16, 16, 1])]);
     for method in [jitter::METHOD, disk::METHOD, exact::METHOD] {
         let shader = gather::shader(method);
         assert_eq!(validated_workgroups(&shader), [("scatter".into(), [8, 8, 1])]);

@@ -39,12 +39,15 @@ pub(crate) const HALVE: &str = concat!(
     include_str!("halve.wgsl")
 );
 
-/// Least standard deviation in pixels of the image that a Gaussian runs on. 0.8 leaves a narrow Gaussian to do after
-/// what halving and interpolation blur (0.58 pixels of the level).
-const PIXELS_A_DEVIATION: f64 = 0.8;
+/// Least standard deviation in pixels of the image that a Gaussian runs on: what halving and interpolation blur (the
+/// square root of a third, see [`blur_of_level_px2`]).
+const PIXELS_A_DEVIATION: f64 = 0.577;
 
-/// The smallest image is the view halved this often.
-const MAX_LEVEL: usize = 5;
+/// The smallest image is the view halved this often: one pass halves three times.
+const MAX_LEVEL: usize = 3;
+
+/// Pixels across of the view that a workgroup halves.
+const HALVED_PIXELS: u32 = 32;
 
 /// The method, ready for one profile.
 pub(crate) struct ScreenGauss {
@@ -186,7 +189,7 @@ impl ScreenGauss {
         let lines = |vertical, sum| [false, true].map(|levels| Line::new(gpu, vertical, levels, sum));
         Ok(Self {
             gaussians: gaussians(profile, terms)?,
-            halve: gpu.compute_pipeline("scatter halve", HALVE, "halve"),
+            halve: gpu.compute_pipeline_without_clear("scatter halve", HALVE, "halve"),
             horizontal: lines(false, Sum::None),
             vertical: lines(true, Sum::Own),
             vertical_with_coarser: lines(true, Sum::WithCoarser),
@@ -208,20 +211,20 @@ impl ScreenGauss {
         of_view.light = images.irradiance.clone();
         of_view.scratch = images.scratch.clone();
         of_view.sums[0] = images.scattered.clone();
-        for level in self.canvases.len()..plan.len() {
-            self.canvases.push(Canvas::new(r.gpu, size.map(|s| s.div_ceil(1 << level))));
-        }
-
-        for pair in self.canvases[..plan.len()].windows(2) {
-            let texture = wgpu::BindingResource::TextureView;
-            let resources = [texture(&pair[0].light), texture(&pair[1].light)];
-            let group = r.gpu.bind("scatter halve", &self.halve, 0, &resources);
+        if plan.len() > 1 {
+            for level in self.canvases.len()..=MAX_LEVEL {
+                self.canvases.push(Canvas::new(r.gpu, size.map(|s| s.div_ceil(1 << level))));
+            }
+            let lights: Vec<_> =
+                self.canvases.iter().map(|c| wgpu::BindingResource::TextureView(&c.light)).collect();
+            let group = r.gpu.bind("scatter halve", &self.halve, 0, &lights);
             let mut pass = r.timer.compute(r.encoder, "scatter halve");
             pass.set_pipeline(&self.halve);
             pass.set_bind_group(0, &group, &[]);
-            let [width, height] = pair[1].size();
-            pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
+            let [x, y] = size.map(|s| s.div_ceil(HALVED_PIXELS));
+            pass.dispatch_workgroups(x, y, 1);
         }
+
         let mut coarser = None;
         for (index, level) in plan.iter().enumerate().rev() {
             self.record_level(r, images, index, level, coarser);
@@ -261,9 +264,22 @@ impl ScreenGauss {
                 sums.push(image);
             }
             let params = r.gpu.uniform("screen-gauss", &params);
-            let step = [blurred, &canvas.scratch];
-            self.horizontal[is_small].record(r.gpu, r.encoder, r.timer, r.view, &params, images, step, &[]);
-            let step = [&canvas.scratch, next];
+            let mut source = blurred;
+            if !level.steps.is_empty() {
+                let step = [source, &canvas.scratch];
+                self.horizontal[is_small].record(
+                    r.gpu,
+                    r.encoder,
+                    r.timer,
+                    r.view,
+                    &params,
+                    images,
+                    step,
+                    &[],
+                );
+                source = &canvas.scratch;
+            }
+            let step = [source, next];
             vertical.record(r.gpu, r.encoder, r.timer, r.view, &params, images, step, &sums);
             (blurred, sum) = (next, next_sum);
         }

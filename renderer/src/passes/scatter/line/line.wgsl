@@ -125,11 +125,14 @@ fn texel(at: vec2i) -> vec4f {
 // texels may be of two surfaces, and each goes by its own depth.
 fn tap(at: vec2i, x: f32, center: vec4f, slope: f32, plane_mm: f32) -> vec3f {
     let axis = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
-    let place = (vec2f(at) + 0.5 + x * vec2f(axis)) / vec2f(image_size());
-    let light = textureSampleLevel(source, linear, place, 0.0);
-    let expected_mm = center.a + slope * x;
-    if abs(light.a - expected_mm) <= plane_mm || light.a > ALL_FAR_MM {
-        return change(light, center, expected_mm);
+    // Texels of a level are few and wide: there each always goes by its own depth.
+    if !LEVELS {
+        let place = (vec2f(at) + 0.5 + x * vec2f(axis)) / vec2f(image_size());
+        let light = textureSampleLevel(source, linear, place, 0.0);
+        let expected_mm = center.a + slope * x;
+        if abs(light.a - expected_mm) <= plane_mm || light.a > ALL_FAR_MM {
+            return change(light, center, expected_mm);
+        }
     }
     let low = floor(x);
     let before = change(texel(at + i32(low) * axis), center, center.a + slope * low);
@@ -143,33 +146,37 @@ fn blur(at: vec2i) -> vec4f {
         return raw;
     }
     let center = vec4f(min(raw.rgb, vec3f(HALF_MAX)), raw.a);
+    let axis = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
     var strength: f32;
-    // The middle of the pixel, and to the next one, in pixels of the view.
+    // The middle of the pixel in pixels of the view.
     var middle = at;
-    var next = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
+    // Pixels of the view across this one.
+    var across = 1.0;
     if LEVELS {
         middle = (at << vec2u(params.level)) + (1 << (params.level - 1u));
-        next = next << vec2u(params.level);
+        across = f32(1u << params.level);
         let around = textureGather(3, albedo, linear, vec2f(middle) / vec2f(view.size));
         strength = max(max(around.x, around.y), max(around.z, around.w));
     } else {
         strength = textureLoad(albedo, at, 0).a;
     }
     var here = depth_at(middle);
+    var slope = surface_slope(depth_at(middle - axis), here, depth_at(middle + axis), pixels_per_mm(view, here));
     if LEVELS {
         // The middle may be of another surface than the light.
         let mean = center.a + view.depth_origin_mm;
-        here = select(mean, here, abs(here - mean) < ONE_SURFACE_MM);
+        if abs(here - mean) >= ONE_SURFACE_MM {
+            here = mean;
+            slope = 0.0;
+        }
     }
-    var per_mm = pixels_per_mm(view, here);
-    if LEVELS {
-        per_mm /= f32(1u << params.level);
-    }
-    if strength <= 0.0 || strength * per_mm * params.visible_mm < 0.5 {
+    let per_mm = pixels_per_mm(view, here);
+    let kernel_per_mm = strength * per_mm / across;
+    if kernel_per_mm * params.visible_mm < 0.5 {
         return center;
     }
-    let slope = surface_slope(depth_at(middle - next), here, depth_at(middle + next), per_mm);
-    let scale = strength * per_mm * foreshortening(slope, per_mm);
+    let scale = kernel_per_mm * foreshortening(slope, per_mm);
+    slope *= across;
     var result = center.rgb;
     for (var i = 0u; i < params.pair_count; i++) {
         let pair = params.pairs[i];
