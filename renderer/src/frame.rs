@@ -15,6 +15,7 @@ use crate::passes::appearance::{Appearance, AppearanceMethods, Blended, ColorMet
 use crate::passes::compose::Compose;
 use crate::passes::cropped_hair::CroppedHair;
 use crate::passes::display::Display;
+use crate::passes::fibre::Fibre;
 use crate::passes::morph::Morph;
 use crate::passes::overlay::{Overlaid, Overlay};
 use crate::passes::scatter::surface::{self, Skin, Surface};
@@ -112,6 +113,7 @@ pub struct Renderer {
     shade: Shade,
     scatter: Scatter,
     compose: Compose,
+    fibre: Fibre,
     cropped_hair: CroppedHair,
     overlay: Overlay,
     display: Display,
@@ -165,6 +167,7 @@ impl Renderer {
             shade: Shade::new(&gpu),
             scatter: Scatter::default(),
             compose: Compose::new(&gpu),
+            fibre: Fibre::new(&gpu),
             cropped_hair: CroppedHair::new(&gpu),
             overlay: Overlay::new(&gpu),
             display: Display::new(&gpu),
@@ -598,15 +601,6 @@ impl Renderer {
             let inputs = [diffuse, &targets.albedo, &targets.direct, &sample.depth];
             self.compose.record(gpu, encoder, timer, scene.background_linear, inputs, &targets.hdr);
             let ambient = average_light(scene);
-            let haired: Vec<_> = heads
-                .iter()
-                .filter(|(h, _)| h.hair_root_count > 0)
-                .map(|(h, i)| (*h, &i.positions, &i.frames))
-                .collect();
-            if !haired.is_empty() {
-                let images = [&targets.irradiance, &sample.depth, &targets.hdr];
-                self.cropped_hair.record(gpu, encoder, timer, &view, ambient, &haired, images);
-            }
             // The first frame has nothing before it: its positions stand for the previous ones.
             let known = self.past.clip_from_world.is_some();
             let previous =
@@ -625,20 +619,24 @@ impl Renderer {
                     .collect();
                 self.velocity.record(gpu, encoder, timer, &view, &moving, &sample.ids, velocity);
             }
-            let overlays: Vec<_> = heads
-                .iter()
-                .zip(&previous_positions)
-                .filter(|((head, _), _)| head.overlay_triangles > 0)
-                .map(|((head, i), previous_positions)| Overlaid {
+            let over = |has: fn(&HeadOnGpu) -> bool| -> Vec<_> {
+                let all = heads.iter().zip(&previous_positions).filter(|((head, _), _)| has(head));
+                all.map(|((head, i), previous_positions)| Overlaid {
                     head,
                     positions: &i.positions,
                     previous_positions,
                     frames: &i.frames,
                 })
-                .collect();
+                .collect()
+            };
+            let light = (&self.fibre, &lighting);
+            let haired = over(|head| head.hair_root_count > 0);
+            if !haired.is_empty() {
+                self.cropped_hair.record(gpu, encoder, timer, light, &haired, &targets.hdr, velocity);
+            }
+            let overlays = over(|head| head.overlay_triangles > 0);
             if !overlays.is_empty() {
-                let images = [&sample.depth, &targets.hdr];
-                self.overlay.record(gpu, encoder, timer, &view, ambient, &overlays, images, velocity);
+                self.overlay.record(gpu, encoder, timer, light, ambient, &overlays, &targets.hdr, velocity);
             }
 
             let (exposure, samples) = (settings.exposure, settings.supersampling);
@@ -729,5 +727,6 @@ fn shaded<'a>(
         wrinkles: appearance.wrinkles,
         specular: appearance.specular,
         pupil_mm: instance.state.pupil_mm,
+        world_from_head: world_from_head(instance),
     }
 }

@@ -89,7 +89,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", hair_color as "hair_color",
             is_second_sample as "is_second_sample", transmit_per_mm as "transmit_per_mm",
             adds_differences as "adds_differences", pupil_mm as "pupil_mm", lobes as "lobes", ring_taps_mm as "ring_taps_mm",
-            ring_ends_mm as "ring_ends_mm", harmonics as "harmonics", lights as "lights"),
+            ring_ends_mm as "ring_ends_mm", middle as "middle", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
         overlay::SHADER,

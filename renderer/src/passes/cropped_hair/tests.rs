@@ -1,9 +1,13 @@
+use glam::{Mat4, Quat};
+use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Material, Part, Vertex};
 use rubor_rig::map::Map;
 
 use super::*;
+use crate::passes::antialias;
 use crate::testing::{assert_layout, offsets, validated_workgroups};
-use crate::tests::dome;
+use crate::tests::{WHITE_TABLE, dome, lamp, renderer, settings};
+use crate::{Camera, HeadInstance, HeadOnGpu, Scene};
 
 /// The dome with hair on the half of its texture where v is under one half, and its triangles.
 fn half_haired() -> (rubor_rig::head::Head, Vec<[u32; 4]>) {
@@ -19,12 +23,7 @@ fn half_haired() -> (rubor_rig::head::Head, Vec<[u32; 4]>) {
 #[test]
 fn shader_is_valid_and_laid_out_as_here() {
     assert_eq!(validated_workgroups(SHADER), []);
-    assert_layout(
-        SHADER,
-        "Params",
-        size_of::<Params>(),
-        &offsets!(Params; color as "color", ambient as "ambient"),
-    );
+    assert_layout(SHADER, "Params", size_of::<Params>(), &offsets!(Params; color as "color"));
     assert_layout(
         SHADER,
         "Root",
@@ -74,4 +73,60 @@ fn strands_keep_their_skin_and_bald_heads_have_no_hair() {
     assert!(fewer.len() < all.len() && !fewer.is_empty(), "{} and {}", fewer.len(), all.len());
     head.maps.hair = None;
     assert_eq!(roots(&head, &triangles), []);
+}
+
+#[test]
+fn a_hair_moves_with_its_root() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    // 21 mm of the lower edge of the dome, seen from so far that depth hardly matters: a hair is 1.7 pixels wide.
+    let edge = Vec3::new(0.0, -0.08, 0.0358);
+    let distance = 0.6;
+    let size = 256u32;
+    let fov_degrees = 2.0 * (0.0105f32 / distance).atan().to_degrees();
+    let pixels_per_metre = size as f32 / 0.021;
+    let mut settings = settings([size; 2]);
+    settings.antialias = antialias::Settings::new(antialias::Mode::SmaaT2x, antialias::Preset::High);
+    // The head nods sideways about the axis of the camera; the edge stands still but for that.
+    let turn = 0.002f32;
+    for angle in [0.0, turn] {
+        let mut state = FaceState::neutral(&head);
+        state.head_rotation = Quat::from_rotation_z(angle);
+        let heads = [HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }];
+        let scene = Scene {
+            heads: &heads,
+            camera: Camera { position: edge + distance * Vec3::Z, target: edge, up: Vec3::Y, fov_degrees },
+            lights: &[lamp()],
+            environment: None,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+        };
+        renderer.render(&scene, &settings).expect("it draws");
+    }
+    let velocity = renderer.read_velocity().expect("motion comes back");
+    let root_pixels = 2.0 * (0.5 * turn).sin() * 0.08 * pixels_per_metre;
+    let (mut hairs, mut farthest_mm) = (0, 0.0f32);
+    // Below the edge there is only hair before a background that stands still.
+    for y in size / 2 + 4..size {
+        for x in 96..160 {
+            let [right, down] = velocity[(y * size + x) as usize];
+            if right == 0.0 && down == 0.0 {
+                continue;
+            }
+            hairs += 1;
+            farthest_mm = farthest_mm.max((y as f32 - size as f32 / 2.0) / pixels_per_metre * 1e3);
+            // Roots lie on the edge or up to 6 mm above; where blended hairs leave some of the background it stands still.
+            assert!(right < 1.01 * root_pixels && right > 0.0, "{right} of {root_pixels} at {x}, {y}");
+            assert!(down.abs() < 0.08 * root_pixels, "{down} at {x}, {y}");
+        }
+    }
+    let full = (size / 2 + 4..size)
+        .flat_map(|y| (96..160).map(move |x| (x, y)))
+        .filter(|(x, y)| velocity[(y * size + x) as usize][0] > 0.9 * root_pixels)
+        .count();
+    assert!(hairs > 200 && full > hairs / 2, "{hairs} pixels of hair, {full} with all of the motion");
+    // A tip three millimetres out would move by 4 % more.
+    assert!(farthest_mm > 3.0, "hair up to {farthest_mm} mm");
 }

@@ -1,14 +1,14 @@
 //! Lashes, hair cards and wet films: the only blended triangles of a frame, drawn over the composed picture.
 //!
 //! ```text
-//! positions, frames, depth (tested, not written), hdr --overlay--> hdr, velocity (premultiplied over)
+//! positions, frames, light, depth (tested, not written), hdr --overlay--> hdr, velocity (premultiplied over)
 //! ```
 //!
 //! Motion is mixed with that of what lies behind as colours are: where hair moves before a background that stands
 //! still, history would otherwise be taken from beside the hair.
 //!
 //! A strand of hair is a fraction of a pixel wide: its coverage is computed from its width, so it fades instead of
-//! flickering. `uv` of [`rubor_rig::head::Material::Lash`] says where along the lid and along the strand.
+//! flickering, and its light is that of `fibre` at each vertex. `uv` of [`rubor_rig::head::Material::Lash`] says where along the lid and along the strand.
 //!
 //! Does not: sort (hair is dark on dark, a film only adds light), cast shadows.
 
@@ -17,13 +17,15 @@ use glam::Vec3;
 use crate::gpu::{Gpu, Raster};
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
-use crate::passes::blended;
+use crate::passes::fibre::{Fibre, fibre_wgsl};
+use crate::passes::shade::Lighting;
+use crate::passes::{blended, drawn_over};
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(
     include_str!("../../shared/view.wgsl"),
-    include_str!("../../shared/math.wgsl"),
     include_str!("../../shared/surface.wgsl"),
+    fibre_wgsl!(),
     include_str!("overlay.wgsl")
 );
 
@@ -42,7 +44,7 @@ pub(crate) struct Overlay {
     pipelines: [wgpu::RenderPipeline; 2],
 }
 
-/// What the pass reads of one head.
+/// What this pass and the one of cropped hair read of one head.
 pub(crate) struct Overlaid<'a> {
     pub(crate) head: &'a HeadOnGpu,
     pub(crate) positions: &'a wgpu::Buffer,
@@ -68,37 +70,24 @@ impl Overlay {
         Self { pipelines: [pipeline(&targets[..1]), pipeline(&targets)] }
     }
 
-    /// `ambient` is the irradiance / pi that hair sees on average.
+    /// `ambient` is the irradiance / pi that cards and films see on average.
     pub(crate) fn record(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut PassTimer,
-        view: &wgpu::Buffer,
+        (fibre, lighting): (&Fibre, &Lighting<'_>),
         ambient: Vec3,
         heads: &[Overlaid<'_>],
-        [depth, hdr]: [&wgpu::TextureView; 2],
+        hdr: &wgpu::TextureView,
         velocity: Option<&wgpu::TextureView>,
     ) {
-        let colors: Vec<_> = std::iter::once(hdr)
-            .chain(velocity)
-            .map(|view| {
-                Some(wgpu::RenderPassColorAttachment {
-                    view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
-                })
-            })
-            .collect();
         let pipeline = &self.pipelines[usize::from(velocity.is_some())];
-        let depth = wgpu::RenderPassDepthStencilAttachment {
-            view: depth,
-            depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store }),
-            stencil_ops: None,
-        };
+        let light = fibre.bind(gpu, pipeline, lighting);
+        let (colors, depth) = drawn_over(hdr, velocity, lighting.depth);
         let mut pass = timer.render(encoder, "overlay", &colors, Some(depth));
         pass.set_pipeline(pipeline);
+        pass.set_bind_group(1, &light, &[]);
         for Overlaid { head, positions, previous_positions, frames } in heads {
             let params = Params {
                 ambient: ambient.extend(0.0).to_array(),
@@ -113,7 +102,7 @@ impl Overlay {
                 "overlay",
                 &pipeline.get_bind_group_layout(0),
                 &[
-                    view.as_entire_binding(),
+                    lighting.view.as_entire_binding(),
                     params.as_entire_binding(),
                     positions.as_entire_binding(),
                     head.vertices.as_entire_binding(),

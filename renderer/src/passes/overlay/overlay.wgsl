@@ -1,8 +1,8 @@
 // Lashes, hair cards and the wet film of the eye, blended over the picture.
-// Concatenated after view.wgsl, math.wgsl and surface.wgsl.
+// Concatenated after view.wgsl, surface.wgsl and the light of fibres.
 
 struct Params {
-    // rgb = irradiance / pi that hair sees on average.
+    // rgb = irradiance / pi that cards and films see on average.
     ambient: vec4f,
     // First overlay triangle.
     first: u32,
@@ -37,6 +37,8 @@ struct Corner {
     // x, y, w of the place in the image, without jitter, in this frame and the previous one.
     @location(6) now: vec3f,
     @location(7) before: vec3f,
+    // Of a strand.
+    @location(8) radiance: vec3f,
 }
 
 struct Fragment {
@@ -52,6 +54,7 @@ const STRAND_WIDTH = 0.00013;
 
 // Lashes are the stoutest hairs of the face, and each stands for two or three that cling together.
 const LASH_STOUTNESS = 1.7;
+const LASH_COLOR = vec3f(0.016, 0.011, 0.008);
 
 @vertex
 fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
@@ -62,6 +65,7 @@ fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
     let frame = frames[index];
     var opacity = 1.0;
     var across = 0.0;
+    var radiance = vec3f(0.0);
     var clip = view.clip_from_world * vec4f(position, 1.0);
     if (triangle.w == LASH || triangle.w == HAIR) && vertex.u >= 2.0 {
         // A hair faces the viewer and is drawn no thinner than a pixel; it fades instead.
@@ -77,13 +81,24 @@ fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
         let drawn = max(true_pixels, 1.15);
         opacity = true_pixels / drawn;
         across = 2.0 * side;
+        let to_viewer = normalize(view.origin.xyz - center);
+        let outwards = normalize(frame.normal * sign(dot(frame.normal, to_viewer)) + to_viewer);
+        // Each hair is a little lighter or darker than the next.
+        let random = fract(sin(floor(0.5 * vertex.u) * 127.1) * 43758.5453);
+        let color = select(params.hair.rgb * mix(0.6, 1.6, random), LASH_COLOR, triangle.w == LASH);
+        // Texture coordinates grow towards the tip, bitangents against them.
+        let to_tip = -frame.bitangent_sign * along;
+        radiance = hair_radiance(
+            Hair(center, outwards, to_tip, min(color, vec3f(1.0)), clamp(frame.occlusion, 0.0, 1.0), 0.0),
+            to_viewer,
+        );
         clip += vec4f(normal * side * drawn * 2.0 / vec2f(view.size) * clip.w, 0.0, 0.0);
     }
     clip += vec4f(vec2f(2.0, -2.0) * view.jitter / vec2f(view.size) * clip.w, 0.0, 0.0);
     let now = view.clip_from_world * vec4f(position, 1.0);
     let before = view.previous_clip_from_world * vec4f(previous_positions[vertex.point].xyz, 1.0);
     let uv = vec2f(vertex.u, vertex.v);
-    return Corner(clip, uv, position, frame.normal, triangle.w, opacity, across, now.xyw, before.xyw);
+    return Corner(clip, uv, position, frame.normal, triangle.w, opacity, across, now.xyw, before.xyw, radiance);
 }
 
 // Strands across a card of unit width.
@@ -98,13 +113,10 @@ fn overlay_fragment(corner: Corner) -> Fragment {
 
 fn overlay_color(corner: Corner) -> vec4f {
     if (corner.material == LASH || corner.material == HAIR) && corner.uv.x >= 1.5 {
-        // Brighter along its middle, as a cylinder is; each hair a little lighter or darker than the next.
-        let id = floor(0.5 * corner.uv.x);
-        let random = fract(sin(id * 127.1) * 43758.5453);
-        let albedo = select(params.hair.rgb * mix(0.6, 1.6, random), vec3f(0.016, 0.011, 0.008), corner.material == LASH);
+        // Brighter along its middle, as a cylinder is.
         let round = 0.75 + 0.5 * sqrt(max(1.0 - corner.across * corner.across, 0.0));
         let alpha = clamp(0.96 * corner.opacity, 0.0, 1.0);
-        return vec4f(albedo * params.ambient.rgb * round * alpha, alpha);
+        return vec4f(corner.radiance * round * alpha, alpha);
     }
     if corner.material == LASH || corner.material == HAIR {
         // Lashes lean and cluster: each strand starts a little off and gets thinner towards its tip.

@@ -39,14 +39,26 @@
 //! shadows transmit nothing. For the environment, which has no shadow map, a lamp behind the surface tells the
 //! thickness; where none shines from behind the head, `frame` places a dark one there.
 //!
-//! Does not: reflect one part of the head in another.
+//! Eyes, teeth and the lining of the mouth scatter light too, but not in `scatter`, whose profile is that of skin: their
+//! shadows are means over a disc as wide as light spreads in them (`spread_shadow`; the spread is about one over the
+//! reduced scattering coefficient: Bashkatov et al. 2010 for sclera, Fried et al. 1995 for enamel and dentine), which is
+//! all that a slab a few millimetres thick shows of it. How near lids and lips are is measured along the picture, so what
+//! they hide from outside its border does not darken.
+//!
+//! Tears along the lower lid are a strip whose normal turns from the ball to the lid, so a line in it mirrors each lamp.
+//! The iris is lit as the bowl on which the cornea gathers light, brightest opposite of a lamp's reflection; pigment,
+//! vessels, caruncle, papillae and patches of the lining are noise of texture coordinates, made for the default head.
+//!
+//! Does not: reflect one part of the head in another; carry light between parts of an eye or the mouth.
 
 pub(crate) mod directional_albedo;
+#[cfg(test)]
+mod tests;
 
 use std::fmt;
 use std::str::FromStr;
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec3, Vec4};
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::skin::transmittance::TransmittanceTable;
 
@@ -64,6 +76,7 @@ pub(crate) const SHADER: &str = concat!(
     include_str!("../../shared/view.wgsl"),
     include_str!("../../shared/math.wgsl"),
     include_str!("../../shared/surface.wgsl"),
+    include_str!("../../shared/light.wgsl"),
     include_str!("shade.wgsl"),
     include_str!("eye.wgsl"),
     include_str!("mouth.wgsl"),
@@ -75,6 +88,7 @@ pub(crate) const SAMPLES_SHADER: &str = concat!(
     include_str!("../../shared/view.wgsl"),
     include_str!("../../shared/math.wgsl"),
     include_str!("../../shared/surface.wgsl"),
+    include_str!("../../shared/light.wgsl"),
     include_str!("shade.wgsl"),
     include_str!("eye.wgsl"),
     include_str!("mouth.wgsl"),
@@ -151,6 +165,7 @@ pub(crate) struct Params {
     pub(crate) lobes: [f32; 4],
     pub(crate) ring_taps_mm: [f32; RINGS],
     pub(crate) ring_ends_mm: [f32; RINGS],
+    pub(crate) middle: [f32; 4],
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
@@ -272,6 +287,7 @@ pub(crate) struct Shaded<'a> {
     pub(crate) pupil_mm: f32,
     pub(crate) wrinkles: WrinkleMethod,
     pub(crate) specular: SpecularMethod,
+    pub(crate) world_from_head: Mat4,
 }
 
 /// The pipeline of the pass.
@@ -498,7 +514,16 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
             let [r, g, b] = m.hair_color_linear;
             [r, g, b, 1.0]
         }),
+        middle: middle(shaded).to_array(),
         harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
         lights: lighting.lights,
     }
+}
+
+/// The plane between the halves of a head: its dot product with a place in the world is positive on the character's left.
+fn middle(shaded: &Shaded<'_>) -> Vec4 {
+    let (low, high) = shaded.head.bounds;
+    let left = shaded.world_from_head.transform_vector3(Vec3::X);
+    let center = shaded.world_from_head.transform_point3(0.5 * (low + high));
+    left.extend(-left.dot(center))
 }

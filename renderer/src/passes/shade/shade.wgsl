@@ -1,19 +1,5 @@
 // Light on the visible surface of one head.
-// Concatenated after view.wgsl, math.wgsl and surface.wgsl.
-
-struct Light {
-    clip_from_world: mat4x4f,
-    // rgb = irradiance at 1 m (or anywhere, for a directional light), w = source radius.
-    color: vec4f,
-    // xyz = place or unit direction from the scene to the light, w = 1 for a place, 0 for a direction.
-    position: vec4f,
-    // xyz = unit direction of a spot, w = cosine of its outer angle (-2 for no cone).
-    spot: vec4f,
-    // x = cosine of the inner angle, y = shadow layer or -1, z = near and w = far of the shadow map, metres.
-    shape: vec4f,
-    // x = metres across the shadow map at 1 m (or anywhere, for a directional light).
-    shadow: vec4f,
-}
+// Concatenated after view.wgsl, math.wgsl, surface.wgsl and light.wgsl.
 
 struct Params {
     // Material constants of this head.
@@ -41,6 +27,8 @@ struct Params {
     // Radii of the taps and outer edges of the rings around the ray of a light, mm.
     ring_taps_mm: vec4f,
     ring_ends_mm: vec4f,
+    // Plane between the halves of the head; positive on the character's left.
+    middle: vec4f,
     // Real spherical harmonics of the environment's irradiance / pi, rgb.
     harmonics: array<vec4f, 9>,
     lights: array<Light, 8>,
@@ -116,6 +104,8 @@ struct Surface {
     f0: f32,
     // Normal that diffuse light uses (differs from `normal` in the iris).
     diffuse_normal: vec3f,
+    // How far light spreads within what this pass does not scatter otherwise (eyes, teeth, gums), mm.
+    spread_mm: f32,
 }
 
 @compute @workgroup_size(8, 8)
@@ -245,23 +235,14 @@ fn surface_of(corners: vec4u, here: vec3f, duv_dx: vec2f, duv_dy: vec2f, back: f
     surface.normal = surface.smooth_normal;
     surface.f0 = 0.028;
     surface.scattering = 0.0;
+    surface.spread_mm = 0.0;
     switch corners.w {
         case SKIN: { skin(&surface, uv, duv_dx, duv_dy, tangent, bitangent); }
         case EYE: {
-            let clip = view.clip_from_world * vec4f(surface.position, 1.0);
-            let pixel = (clip.xy / clip.w * vec2f(0.5, -0.5) + 0.5) * vec2f(view.size) + view.jitter;
-            eye(&surface, pixel, uv, duv_dx, duv_dy, tangent, bitangent, to_viewer);
+            eye(&surface, uv, duv_dx, duv_dy, tangent, bitangent, to_viewer);
         }
-        case TEETH: {
-            teeth(&surface, uv, tangent, bitangent);
-        }
-        case GUMS, MUCOSA: {
-            surface.albedo = vec3f(0.30, 0.085, 0.078);
-            surface.specular = 0.5;
-            surface.roughness = 0.22;
-            // Deep, but never black: red light is passed on from wall to wall.
-            surface.occlusion = max(surface.occlusion * surface.occlusion * surface.occlusion, 0.10);
-        }
+        case TEETH: { teeth(&surface, uv, tangent, bitangent); }
+        case GUMS, MUCOSA: { lining(&surface, uv, duv_dx, duv_dy, tangent, bitangent, corners.w == GUMS); }
         default: {
             surface.albedo = vec3f(0.2);
             surface.specular = 0.3;
@@ -349,9 +330,11 @@ fn skin(surface: ptr<function, Surface>, uv: vec2f, duv_dx: vec2f, duv_dy: vec2f
     (*surface).albedo =
         textureSampleLevel(skin_color, linear_clamp, (axes * (table - 1.0) + 0.5) / table, 0.0).rgb;
 
-    (*surface).albedo = mix((*surface).albedo, params.hair_color.rgb, map.a);
+    // Hairs that are not drawn one by one hide the skin, keep light off what shows between them, and cover its shine.
+    let hidden = 0.97 * smoothstep(0.0, 0.85, map.a);
+    (*surface).albedo = mix((*surface).albedo, params.hair_color.rgb, hidden) * (1.0 - 0.3 * hidden);
 
-    (*surface).specular = gloss.r;
+    (*surface).specular = gloss.r * (1.0 - hidden);
     // Slope variance that the mip level hides is roughness (Toksvig 2005; for Beckmann m^2 = 2 sigma^2).
     let variance = square(params.slope_scale) * (fine.z + micro.z);
     (*surface).roughness = sqrt(min(square(gloss.g) + 2.0 * variance, 0.64));
@@ -376,31 +359,6 @@ fn highlight(cos_half: f32, roughness: f32, spread: f32) -> f32 {
         return smoothstep(radius + 0.5 * roughness, radius - 0.5 * roughness, sine) / (PI * radius * radius);
     }
     return beckmann(cos_half, sqrt(square(roughness) + 0.25 * square(spread)));
-}
-
-fn schlick(f0: f32, cosine: f32) -> f32 { return f0 + (1.0 - f0) * pow5(1.0 - clamp(cosine, 0.0, 1.0)); }
-
-// Irradiance of a surface that faces a light, as far as its place and cone go, and where the light is.
-struct Arriving {
-    irradiance: vec3f,
-    to_light: vec3f,
-    // Tangent of half the angle that the source fills.
-    spread: f32,
-}
-
-fn arriving(light: Light, position: vec3f) -> Arriving {
-    var result = Arriving(light.color.rgb, light.position.xyz, light.color.w);
-    if light.position.w > 0.0 {
-        let way = light.position.xyz - position;
-        let distance_squared = max(dot(way, way), 1e-4);
-        result.to_light = normalize(way);
-        result.irradiance /= distance_squared;
-        result.spread *= inverseSqrt(distance_squared);
-        if light.spot.w > -1.5 {
-            result.irradiance *= smoothstep(light.spot.w, light.shape.x, -dot(result.to_light, light.spot.xyz));
-        }
-    }
-    return result;
 }
 
 // Share of the light from (or towards) a direction that the specular lobe takes before the diffuse one (d'Eon and Luebke
@@ -477,7 +435,7 @@ fn add_light(
         return;
     }
     if light.shape.y >= 0.0 {
-        irradiance *= shadow(light, surface, lit, turn);
+        irradiance *= spread_shadow(light, surface, lit, turn);
     }
     // A bump cannot see a light that its surface does not face.
     let horizon = smoothstep(-0.05, 0.10, facing);
@@ -692,34 +650,7 @@ fn transmitted(surface: Surface, turn: f32) -> vec3f {
     return sum;
 }
 
-// Distance from the light along its axis, metres, of a depth of the shadow map.
-fn shadow_metres(light: Light, depth: f32) -> f32 {
-    let near = light.shape.z;
-    let far = light.shape.w;
-    if light.position.w > 0.0 {
-        return near * far / (far - depth * (far - near));
-    }
-    return near + depth * (far - near);
-}
-
-fn shadow_depth(light: Light, metres: f32) -> f32 {
-    let near = light.shape.z;
-    let far = light.shape.w;
-    if light.position.w > 0.0 {
-        return (far - near * far / metres) / (far - near);
-    }
-    return (metres - near) / (far - near);
-}
-
-// Irradiance / pi from spherical harmonics (Ramamoorthi and Hanrahan 2001); the convolution is in the coefficients.
-fn harmonic_irradiance(n: vec3f) -> vec3f {
-    let h = params.harmonics;
-    let sum = h[0].rgb
-        + h[1].rgb * n.y + h[2].rgb * n.z + h[3].rgb * n.x
-        + h[4].rgb * (n.x * n.y) + h[5].rgb * (n.y * n.z) + h[6].rgb * (3.0 * n.z * n.z - 1.0)
-        + h[7].rgb * (n.x * n.z) + h[8].rgb * (n.x * n.x - n.y * n.y);
-    return max(sum, vec3f(0.0));
-}
+fn harmonic_irradiance(n: vec3f) -> vec3f { return irradiance_of_harmonics(params.harmonics, n); }
 
 fn ambient_diffuse(surface: Surface) -> vec3f {
     if view.has_environment == 0u {
@@ -743,7 +674,7 @@ fn ambient_specular(surface: Surface, to_viewer: vec3f) -> vec3f {
     let n = surface.normal;
     let cosine = clamp(dot(n, to_viewer), 0.0, 1.0);
     let r = reflect(-to_viewer, n);
-    let uv = vec2f(atan2(r.x, -r.z) / (2.0 * PI) + 0.5, acos(clamp(r.y, -1.0, 1.0)) / PI);
+    let uv = place_in_sky(r);
     let is_skin = surface.scattering > 0.0;
     var radiance = mirrored(uv, select(1.0, params.lobes.x, is_skin) * surface.roughness);
     if is_skin && params.lobes.z > 0.0 {

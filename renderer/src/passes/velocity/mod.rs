@@ -7,7 +7,7 @@
 //! Theory: the point that a pixel sees keeps its barycentric coordinates, so its previous place is known exactly:
 //! morphs, head motion and camera are all in the two sets of positions and matrices (papers/004 section 10.3.3).
 //!
-//! Lashes and hair mix their own motion in (see the overlay).
+//! Hair and lashes mix their own motion in afterwards (see `cropped_hair` and `overlay`).
 //!
 //! Does not: follow what moves on the surface (blood, wrinkles).
 

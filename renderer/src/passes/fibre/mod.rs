@@ -1,0 +1,125 @@
+//! Light on hair, for the passes that draw it: a fibre with three lobes and the light of its neighbours.
+//!
+//! ```text
+//! lamps, shadow maps, environment, place and direction of a hair --hair_radiance--> radiance, once a vertex
+//! ```
+//!
+//! Theory: a fibre is a rough dielectric cylinder of coloured glass (Marschner et al. 2003, "Light scattering from human
+//! hair fibers"). With inclinations `i` of the light and `o` of the viewer against the plane across the fibre and `phi`
+//! the azimuth between them, its radiance for unit irradiance across the light is
+//!
+//! ```text
+//! L = sum over lobes of  A M(sin i + sin o - shift) N(phi)  min(1, cos i / cos o)  +  0.4 C cylinder(phi) cos i
+//! ```
+//!
+//! - mirrored off the cuticle: N = cos(phi / 2) / 4, A = Fresnel. Scales lean towards the tip, so light leaves nearer to
+//!   the root's side than a mirror sends it, and the highlight on a head stands nearer to the tips;
+//! - through the fibre (of which 0.15 is seen, as cropped hair lies on more hair), and returned off its far side: shifted half as far and twice as far the other way, as Marschner
+//!   found, and coloured by absorption along the way inside;
+//! - what other hairs pass on: a Lambertian cylinder (Kajiya and Kay 1989, with the half of it that the light reaches).
+//!
+//! M is a Gaussian in the sum of sines and the lobes' azimuths are exponentials of its cosine (B. Karis 2016, "Physically
+//! based hair shading in Unreal"); each is scaled here to integrate to one over directions. Absorption follows from the
+//! albedo C of a mass of hair by the fit of Chiang et al. 2016 ("A practical and controllable hair and fur model", at
+//! azimuthal roughness 0.3).
+//!
+//! Differs from the sources: min(1, cos i / cos o) makes the lobes reciprocal and keeps the light that leaves below the
+//! light that arrives at any angle; the size of a lamp widens the lobes. Hairs above dim the light by exp(-depth / cosine)
+//! towards the root. The environment gives a prefiltered look-up along the mirrored direction for the first lobe and its
+//! irradiance for the rest.
+//!
+//! Costs, on llvmpipe at 1280 x 720 with three lamps and an environment: the cropped hairs of a head take 2.4 to 3 times as
+//! long as with the light of the skin under them, 3 % of a frame.
+//!
+//! Does not: follow single paths between hairs, cast the hair's own shadow on skin, know elliptic fibres or their glints.
+
+#[cfg(test)]
+mod reference;
+#[cfg(test)]
+mod tests;
+
+use crate::gpu::Gpu;
+use crate::passes::shade::{GpuLight, Lighting};
+use crate::scene::MAX_LIGHTS;
+
+/// WGSL that a pass puts before its own; needs view.wgsl.
+macro_rules! fibre_wgsl {
+    () => {
+        concat!(
+            include_str!("../../shared/math.wgsl"),
+            include_str!("../../shared/light.wgsl"),
+            include_str!("../fibre/fibre.wgsl"),
+            include_str!("../fibre/hair_light.wgsl")
+        )
+    };
+}
+pub(crate) use fibre_wgsl;
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct HairLight {
+    pub(crate) environment_intensity: f32,
+    pub(crate) environment_levels: f32,
+    pub(crate) padding: [u32; 2],
+    pub(crate) harmonics: [[f32; 4]; 9],
+    pub(crate) lights: [GpuLight; MAX_LIGHTS],
+}
+
+/// What reads the light of a scene.
+pub(crate) struct Fibre {
+    compare: wgpu::Sampler,
+    trilinear_repeat: wgpu::Sampler,
+    black: wgpu::TextureView,
+}
+
+impl Fibre {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let linear = wgpu::SamplerDescriptor {
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        };
+        Self {
+            compare: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("hair: shadow"),
+                compare: Some(wgpu::CompareFunction::LessEqual),
+                ..linear.clone()
+            }),
+            trilinear_repeat: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("hair: trilinear repeat"),
+                address_mode_u: wgpu::AddressMode::Repeat,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                ..linear
+            }),
+            black: crate::texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]),
+        }
+    }
+
+    /// Group 1 of a pass that draws hair.
+    pub(crate) fn bind(
+        &self,
+        gpu: &Gpu,
+        pipeline: &wgpu::RenderPipeline,
+        lighting: &Lighting<'_>,
+    ) -> wgpu::BindGroup {
+        let light = HairLight {
+            environment_intensity: lighting.environment_intensity,
+            environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
+            padding: [0; 2],
+            harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
+            lights: lighting.lights,
+        };
+        let light = gpu.uniform("hair light", &light);
+        gpu.bind_layout(
+            "hair light",
+            &pipeline.get_bind_group_layout(1),
+            &[
+                light.as_entire_binding(),
+                wgpu::BindingResource::TextureView(lighting.shadows),
+                wgpu::BindingResource::Sampler(&self.compare),
+                wgpu::BindingResource::TextureView(lighting.environment.map_or(&self.black, |e| &e.filtered)),
+                wgpu::BindingResource::Sampler(&self.trilinear_repeat),
+            ],
+        )
+    }
+}

@@ -1,0 +1,91 @@
+//! Light that spreads within what `scatter` leaves alone.
+
+use glam::{Mat4, Vec2, Vec3};
+use rubor_rig::face_state::FaceState;
+use rubor_rig::head::{Head, Material, Mesh, Part, Vertex};
+
+use crate::tests::{WHITE_TABLE, renderer, settings};
+use crate::{Camera, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
+
+const SIZE: u32 = 128;
+/// Across the picture.
+const SEEN_MM: f32 = 12.0;
+
+/// A square of a material that faces +Z and, 5 mm before it and beside the picture, a flap of skin.
+fn head(material: Material, has_flap: bool) -> Head {
+    let mut mesh = Mesh::default();
+    let mut quad = |low: Vec3, high: Vec3, material: Material| {
+        let first = mesh.vertices.len() as u32;
+        for (x, y) in [(low.x, low.y), (high.x, low.y), (high.x, high.y), (low.x, high.y)] {
+            let point = mesh.points.len() as u32;
+            mesh.points.push(0.001 * Vec3::new(x, y, low.z));
+            // Millimetres along the arch and from the biting edge, as of teeth.
+            mesh.vertices.push(Vertex { point, uv: Vec2::new(0.04 + 1e-3 * x, 0.55 + 1e-3 * y) });
+        }
+        let start = mesh.triangles.len() as u32;
+        mesh.triangles.push([first, first + 1, first + 2]);
+        mesh.triangles.push([first, first + 2, first + 3]);
+        mesh.parts.push(Part { name: format!("{start}"), material, triangles: start..start + 2 });
+    };
+    quad(Vec3::new(-30.0, -30.0, 0.0), Vec3::new(30.0, 30.0, 0.0), material);
+    if has_flap {
+        quad(Vec3::new(8.0, -30.0, 5.0), Vec3::new(30.0, 30.0, 5.0), Material::Skin);
+    }
+    Head { name: "flap".into(), mesh, ..Head::default() }
+}
+
+/// Light of the middle row.
+fn row(renderer: &mut Renderer, material: Material, has_flap: bool) -> Vec<f32> {
+    let head = head(material, has_flap);
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("it uploads");
+    let state = FaceState::neutral(&head);
+    let heads = [HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }];
+    let scene = Scene {
+        heads: &heads,
+        camera: Camera {
+            position: 0.3 * Vec3::Z,
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            fov_degrees: 2.0 * (0.5e-3 * SEEN_MM / 0.3).atan().to_degrees(),
+        },
+        // The edge of the flap shadows x = 3 mm.
+        lights: &[Light {
+            kind: LightKind::Directional { direction: Vec3::new(-1.0, 0.0, -1.0).normalize() },
+            color_linear: Vec3::splat(2.0),
+            radius: 0.0,
+            casts_shadow: true,
+        }],
+        environment: None,
+        environment_intensity: 0.0,
+        background_linear: Vec3::ZERO,
+    };
+    let mut settings = settings([SIZE; 2]);
+    settings.shadow_size = 1024;
+    renderer.render(&scene, &settings).expect("it draws");
+    let hdr = renderer.read_hdr().expect("light comes back");
+    (0..SIZE).map(|x| hdr[(SIZE / 2 * SIZE + x) as usize][1]).collect()
+}
+
+/// Millimetres over which a shadow falls from nine to one tenth of the light, and where half of it is.
+fn edge_mm(renderer: &mut Renderer, material: Material) -> (f32, f32) {
+    let lit = row(renderer, material, false);
+    let shadowed = row(renderer, material, true);
+    let seen: Vec<f32> = shadowed.iter().zip(&lit).map(|(s, l)| s / l).collect();
+    assert!(seen[8] > 0.99 && seen[SIZE as usize - 8] < 0.01, "{seen:?}");
+    let place = |share: f32| {
+        let pixels = seen.iter().filter(|s| **s > share).count();
+        (pixels as f32 / SIZE as f32 - 0.5) * SEEN_MM
+    };
+    (place(0.1) - place(0.9), place(0.5))
+}
+
+#[test]
+fn light_spreads_in_teeth_and_not_in_what_is_opaque() {
+    let Some(mut renderer) = renderer() else { return };
+    let (hard_mm, hard_at) = edge_mm(&mut renderer, Material::Other);
+    let (soft_mm, soft_at) = edge_mm(&mut renderer, Material::Teeth);
+    assert!(hard_mm < 0.5, "{hard_mm}");
+    assert!((1.0..2.6).contains(&soft_mm), "a disc of 1.3 mm about each place: {soft_mm} mm");
+    // The shadow lies where it did.
+    assert!((hard_at - 3.0).abs() < 0.25 && (soft_at - hard_at).abs() < 0.35, "{hard_at} and {soft_at}");
+}
