@@ -214,8 +214,11 @@ fn synthesize_with(
             if Wrinkles::reach(site.place) { site.slopes(wrinkles.gradient(site.place)) } else { [0.0; 2] };
         let hair = half_hairs.cover(site.place, &r);
         let cavity = half_relief.sample(site, &r).cavity;
+        let hollow = r.hollow(site.open);
         let [intensity, roughness] = specular::specular(site.place, &r, cavity, hair, seed);
-        [x, y, intensity, roughness, 1.0 - 0.7 * hair]
+        // Light that enters a hollow is not given back beside it.
+        let scattering = (1.0 - 0.7 * hair) * (1.0 - 0.8 * hollow);
+        [x, y, intensity * (1.0 - 0.85 * hollow), roughness, scattering]
     });
     let scattering = broad.pop();
     let specular = broad.pop();
@@ -229,8 +232,9 @@ fn synthesize_with(
         let r = Regions::at(site.place);
         let relief = relief.sample(site, &r);
         let hair = hairs.cover(site.place, &r);
-        let melanin = chromophores.melanin(site.place, &r, relief.cavity);
-        let (_, hemoglobin) = chromophores.hemoglobin_with_mean(site.place, &r);
+        let hollow = r.hollow(site.open);
+        let melanin = chromophores.melanin(site.place, &r, relief.cavity, hollow);
+        let (_, hemoglobin) = chromophores.hemoglobin_with_mean(site.place, &r, hollow);
         let [mut x, mut y] = site.slopes(relief.gradient);
         if let Some(map) = wrinkle_slopes.first() {
             // Both maps have the same texture frame, so slopes simply add.
@@ -248,9 +252,9 @@ fn synthesize_with(
     let texel_mm = surface.texel_mm(STATISTICS_RESOLUTION);
     let radius_px = (STATISTICS_RADIUS_MM / texel_mm).round().clamp(2.0, 64.0) as u32;
     let (hemoglobin_mean, distributions) =
-        expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |place| {
-            let r = Regions::at(place);
-            let (mean, value) = chromophores.hemoglobin_with_mean(place, &r);
+        expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |site| {
+            let r = Regions::at(site.place);
+            let (mean, value) = chromophores.hemoglobin_with_mean(site.place, &r, r.hollow(site.open));
             (r, mean, value)
         })?;
     let masks = surface.rasterise(MASK_RESOLUTION);
