@@ -216,3 +216,54 @@ fn brow_hair(stream: &mut Stream) -> (Hair, [Vec2; 4]) {
     };
     (hair, knots)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scalp(x: f32, y: f32, z: f32) -> f32 {
+        let hairs = Hairs::new(&Options { scalp_hair: 0.95, ..Options::default() }, 0.2);
+        let place = Vec3::new(x, y, z);
+        let [left, right] = [1.0, -1.0].map(|side| {
+            let place = place * Vec3::new(side, 1.0, 1.0);
+            hairs.scalp_density(place, &Regions::at(place))
+        });
+        assert!((left - right).abs() < 0.6, "{place}: {left} and {right}");
+        left.min(right)
+    }
+
+    #[test]
+    fn the_ear_is_bald_and_hair_is_close_about_it() {
+        // Helix, anthelix, concha, lobe, tragus and where the helix leaves the head.
+        for (x, y, z) in [
+            (88.0, -1.5, -20.0),
+            (90.0, -12.0, -32.0),
+            (91.0, -24.0, -35.0),
+            (86.0, -15.0, -24.0),
+            (75.0, -28.0, -16.0),
+            (83.0, -47.0, -13.0),
+            (76.0, -28.0, -6.0),
+            (79.0, -6.0, -8.0),
+            (81.0, -10.0, -9.0),
+        ] {
+            assert!(scalp(x, y, z) < 0.02, "hair on the ear at {x} {y} {z}");
+        }
+        // Above it, behind it, and before it: the sideburn.
+        for (x, y, z) in [(79.0, 9.0, -20.0), (76.0, -8.0, -46.0), (74.0, -25.0, -52.0), (75.0, -12.0, 11.0)]
+        {
+            assert!(scalp(x, y, z) > 0.55, "no hair about the ear at {x} {y} {z}: {}", scalp(x, y, z));
+        }
+    }
+
+    #[test]
+    fn the_sideburn_ends_at_the_middle_of_the_ear() {
+        assert!(scalp(75.0, -19.0, 11.0) > 0.5);
+        for (x, y, z, place) in [
+            (75.0, -34.0, 11.0, "below"),
+            (73.0, -12.0, 27.0, "on the cheek before"),
+            (76.0, -20.0, -1.0, "between it and the tragus"),
+        ] {
+            assert!(scalp(x, y, z) < 0.05, "{place}: {}", scalp(x, y, z));
+        }
+    }
+}

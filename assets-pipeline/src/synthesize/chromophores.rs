@@ -80,7 +80,9 @@ impl Chromophores {
             + 0.05 * r.ear
             - 0.05 * r.lips
             - 0.5 * r.inner;
-        let mut fraction = self.melanin * (uneven + regional + 0.10 * cavity).exp();
+        // Dark skin is of one piece: the same relative change of melanin is seen more on it.
+        let even = 1.0 / (1.0 + 2.5 * self.melanin);
+        let mut fraction = self.melanin * (even * (uneven + regional) + 0.10 * cavity).exp();
         let spots = self.freckle_weight(place, r);
         // Freckles matter on light skin and drown in dark.
         fraction += spots * self.freckles * 0.045 * (-self.melanin / 0.12).exp();

@@ -279,12 +279,13 @@ fn synthesize_with(
     })
 }
 
-/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and black-brown (0.5). Grey hair
-/// is a mix of hairs with pigment and of white ones.
+/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to golden blond (0.1), copper (0.24) and black
+/// (0.5). Grey hair is a mix of hairs with pigment and of white ones.
 fn hair_color_linear(melanin: f32, grey: f32) -> [f32; 3] {
-    let white = [0.26, 0.235, 0.205];
-    let pigmented =
-        [(0.80, 8.0), (0.72, 8.8), (0.60, 9.6)].map(|(root, k): (f32, f32)| root * (-k * melanin).exp());
+    let white = [0.27, 0.23, 0.185];
+    let red = (-((melanin - 0.24) / 0.09).powi(2)).exp();
+    let pigmented = [(0.80, 8.0, 0.0), (0.66, 8.6, 0.36), (0.46, 8.8, 0.66)]
+        .map(|(root, k, taken): (f32, f32, f32)| root * (-k * melanin).exp() * (1.0 - taken * red));
     std::array::from_fn(|i| pigmented[i] + grey * (white[i] - pigmented[i]))
 }
 

@@ -82,7 +82,7 @@ const LIP_BOTTOM: [[f32; 2]; 6] =
 /// Outline of the scalp hair on the plan (|s|, y), mm: up the forehead to the recess, forwards to the peak of the temple,
 /// back to the sideburn, down before the ear to its middle, close over the ear, down behind it and round the nape. The
 /// last corners close it beyond the middle and above the head.
-const HAIRLINE: [[f32; 2]; 27] = [
+const HAIRLINE: [[f32; 2]; 28] = [
     [-40.0, 65.0],
     [0.0, 66.0],
     [26.0, 69.0],
@@ -101,26 +101,27 @@ const HAIRLINE: [[f32; 2]; 27] = [
     [124.0, -12.0],
     [127.0, -4.5],
     [132.5, -1.0],
-    [139.0, 1.0],
-    [147.0, 1.2],
-    [153.5, -3.0],
+    [139.0, 1.6],
+    [147.0, 2.2],
+    [154.0, -2.0],
     [159.5, -12.0],
     [165.0, -25.0],
     [170.0, -42.0],
     [196.0, -64.0],
     [292.0, -72.0],
     [292.0, 140.0],
+    [-40.0, 140.0],
 ];
 /// Outline of the ear seen from its side: (z, y), mm, from the root of the helix over the top.
 const EAR: [[f32; 2]; 18] = [
     [-4.0, -8.0],
     [-8.0, -3.2],
-    [-14.0, -0.4],
-    [-20.0, 0.4],
-    [-27.0, -3.6],
-    [-33.0, -11.5],
-    [-36.5, -20.5],
-    [-36.0, -28.0],
+    [-14.0, 0.9],
+    [-20.0, 1.9],
+    [-28.0, -2.0],
+    [-34.5, -11.0],
+    [-38.0, -20.5],
+    [-37.0, -28.5],
     [-30.5, -37.0],
     [-23.0, -45.0],
     [-18.0, -50.5],
@@ -297,6 +298,37 @@ mod tests {
         for name in ["cheek", "glabella", "pronasale"] {
             let r = at(name);
             assert!(r.lips + r.scalp + r.inner + r.neck + r.lids < 0.05, "{name}: {r:?}");
+        }
+    }
+
+    #[test]
+    fn outlines_have_signed_distances() {
+        let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+        let at = |x, y| outline_distance(&square, Vec2::new(x, y));
+        assert!((at(2.0, 1.0) + 1.0).abs() < 1e-6 && (at(2.0, 5.5) - 1.5).abs() < 1e-6);
+        assert!((at(7.0, 8.0) - 5.0).abs() < 1e-6);
+        // The shortcuts far from the hairline agree with it, and nothing jumps where they begin.
+        for i in 0..200 {
+            for j in 0..60 {
+                let p = Vec2::new(i as f32 * 1.25, 110.0 - 4.0 * j as f32);
+                let exact = -outline_distance(&HAIRLINE, p).clamp(-25.0, 25.0);
+                let found = above_hairline(p);
+                assert_eq!(exact > 0.0, found > 0.0, "{p}");
+                assert!(found == exact || found.abs() >= 25.0 && exact.abs() > 16.0, "{p}: {found}, {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn hollows_are_where_light_does_not_return() {
+        let at = |x, y, z, open| Regions::at(Vec3::new(x, y, z)).hollow(open);
+        assert!(at(73.0, -29.0, -12.0, 0.4) > 0.9, "ear canal");
+        assert!(at(76.0, -29.0, -5.0, 0.9) < 0.01, "outer side of the tragus");
+        assert!(at(88.0, -20.0, -30.0, 0.7) < 0.01, "helix");
+        assert!(at(9.0, -42.0, 93.0, 0.25) > 0.9 && at(-9.0, -42.0, 93.0, 0.25) > 0.9, "nostrils");
+        assert!(at(9.0, -42.0, 93.0, 1.0) < 0.01, "what is seen from everywhere is no hole");
+        for name in ["pronasale", "alare", "subnasale", "cheek", "ear"] {
+            assert!(Regions::at(canonical(name)).hollow(0.5) < 0.35, "{name}");
         }
     }
 
