@@ -25,7 +25,7 @@ use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
 use crate::passes::velocity::{Moving, Velocity};
 use crate::passes::visibility::Visibility;
 use crate::placement::{
-    PICTURE_MARGIN, average_light, lamps, place_lights, receivers, view, world_from_head,
+    PICTURE_MARGIN, average_light, lamps, pixels_per_mm, place_lights, receivers, view, world_from_head,
 };
 use crate::scene::{MAX_HEADS, MAX_LIGHTS, Scene};
 use crate::targets::Targets;
@@ -513,6 +513,7 @@ impl Renderer {
             let jitter = subsample.position_px.map(|p| -p);
             let jitters = [jitter, shading_jitter];
             let view = view(scene, lamps, targets.size, jitters, self.past.clip_from_world);
+            let pixels_per_mm = pixels_per_mm(scene, &view);
             let view = gpu.uniform("view", &view);
             self.visibility.record(gpu, encoder, timer, &view, &drawn, &sample.ids, &sample.depth);
 
@@ -571,7 +572,13 @@ impl Renderer {
                     &targets.scattered
                 }
                 _ => {
-                    let recorder = Recorder { gpu, encoder: &mut *encoder, timer: &mut *timer, view: &view };
+                    let recorder = Recorder {
+                        gpu,
+                        encoder: &mut *encoder,
+                        timer: &mut *timer,
+                        view: &view,
+                        pixels_per_mm,
+                    };
                     self.scatter.record(recorder, &images)
                 }
             };

@@ -44,19 +44,26 @@ pub(crate) fn view(
         near: NEAR_METRES,
         light_count: lamps.len() as u32,
         shading_jitter,
-        depth_origin_mm: 1000.0 * nearest_head(scene, &view_from_world),
+        // Depths near that of the nearest head are kept best.
+        depth_origin_mm: 1000.0 * head_depths(scene, view_from_world).reduce(f32::min).unwrap_or(0.0),
         padding: 0.0,
     }
 }
 
-/// View depth of the nearest head, between its middle and its front, metres: depths near it are kept best.
-fn nearest_head(scene: &Scene<'_>, view_from_world: &Mat4) -> f32 {
-    let depth = |instance: &crate::scene::HeadInstance<'_>| {
+/// View depths of the heads before the camera, between middle and front, metres.
+fn head_depths<'a>(scene: &'a Scene<'_>, view_from_world: Mat4) -> impl Iterator<Item = f32> + 'a {
+    let depth = move |instance: &crate::scene::HeadInstance<'_>| {
         let (low, high) = instance.head.bounds;
         let middle = world_from_head(instance).transform_point3(0.5 * (low + high));
         -view_from_world.transform_point3(middle).z - 0.25 * (high - low).min_element()
     };
-    scene.heads.iter().map(depth).filter(|d| *d > 0.0).reduce(f32::min).unwrap_or(0.0)
+    scene.heads.iter().map(depth).filter(|d| *d > 0.0)
+}
+
+/// Pixels for a millimetre of the farthest head; 1 where none is before the camera.
+pub(crate) fn pixels_per_mm(scene: &Scene<'_>, view: &View) -> f64 {
+    let farthest = head_depths(scene, scene.camera.view_from_world()).reduce(f32::max);
+    farthest.map_or(1.0, |depth| f64::from(view.origin[3]) / (1000.0 * f64::from(depth)))
 }
 
 /// Placement of a head: its own motion first, then its place in the scene.

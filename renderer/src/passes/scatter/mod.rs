@@ -48,6 +48,8 @@ pub(crate) struct Recorder<'a> {
     pub(crate) encoder: &'a mut wgpu::CommandEncoder,
     pub(crate) timer: &'a mut PassTimer,
     pub(crate) view: &'a wgpu::Buffer,
+    /// Pixels for a millimetre of the farthest head.
+    pub(crate) pixels_per_mm: f64,
 }
 
 /// Images of the frame that methods read and write.

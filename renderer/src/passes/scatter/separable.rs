@@ -10,7 +10,7 @@
 use rubor_rig::skin::kernel::SeparableKernel;
 use rubor_rig::skin::profile::Profile;
 
-use super::line::{Line, Params};
+use super::line::{Line, Params, Sum};
 use super::{Images, Recorder};
 use crate::error::RenderError;
 use crate::gpu::Gpu;
@@ -32,7 +32,7 @@ impl Separable {
         let kernel = SeparableKernel::of(profile, samples)?;
         let params = Params::new(&side(&kernel), kernel.half_width_mm(), [0.0; 3]);
         Ok(Self {
-            lines: [false, true].map(|vertical| Line::new(gpu, vertical, false)),
+            lines: [false, true].map(|vertical| Line::new(gpu, vertical, false, Sum::None)),
             params: gpu.uniform("separable", &params),
         })
     }
@@ -40,7 +40,7 @@ impl Separable {
     pub(crate) fn record(&self, r: &mut Recorder<'_>, images: &Images<'_>) {
         let steps = [[images.irradiance, images.scratch], [images.scratch, images.scattered]];
         for (line, step) in self.lines.iter().zip(steps) {
-            line.record(r.gpu, r.encoder, r.timer, r.view, &self.params, images, step, None);
+            line.record(r.gpu, r.encoder, r.timer, r.view, &self.params, images, step, &[]);
         }
     }
 }

@@ -50,6 +50,7 @@ impl Frame {
             color: Vec::new(),
             strength: Vec::new(),
             depth_mm: Vec::new(),
+            view: None,
         };
         for y in 0..size[1] {
             for x in 0..size[0] {
@@ -173,7 +174,9 @@ fn run_with(gpu: &Gpu, frame: &Frame, mut work: impl FnMut(Recorder<'_>, &Images
     let view = gpu.uniform("view", &frame.view());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let mut timer = PassTimer::new(gpu);
-    work(Recorder { gpu, encoder: &mut encoder, timer: &mut timer, view: &view }, &images);
+    let farthest = frame.depth_mm.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
+    let pixels_per_mm = frame.focal_px / farthest;
+    work(Recorder { gpu, encoder: &mut encoder, timer: &mut timer, view: &view, pixels_per_mm }, &images);
     gpu.queue.submit([encoder.finish()]);
     gpu.check().unwrap();
     read(gpu, scattered)
@@ -218,7 +221,7 @@ fn corner(frame: &Frame, width: usize, height: usize) -> Frame {
         color: places.iter().map(|i| frame.color[*i]).collect(),
         strength: places.iter().map(|i| frame.strength[*i]).collect(),
         depth_mm: places.iter().map(|i| frame.depth_mm[*i]).collect(),
-        ..*frame
+        ..frame.clone()
     }
 }
 
@@ -249,17 +252,23 @@ const TAP_SHIFTS: [f64; 3] = [0.0, -1.0 / 256.0, 1.0 / 256.0];
 
 #[test]
 fn shaders_and_structs_are_what_both_sides_count_on() {
-    for (vertical, accumulate) in [(false, false), (true, false), (true, true)] {
-        let shader = line::shader(vertical, accumulate);
-        assert_layout(
-            &shader,
-            "Params",
-            size_of::<line::Params>(),
-            &offsets!(line::Params; pair_count as "pair_count", follow_per_mm as "follow_per_mm",
-                visible_mm as "visible_mm", share as "share", pairs as "pairs"),
-        );
-        assert_eq!(validated_workgroups(&shader), [("scatter".into(), [128, 1, 1])]);
+    use line::Sum;
+    for (vertical, sum) in [(false, Sum::None), (true, Sum::None), (true, Sum::Own), (true, Sum::WithCoarser)]
+    {
+        for levels in [false, true] {
+            let shader = line::shader(vertical, levels, sum);
+            assert_layout(
+                &shader,
+                "Params",
+                size_of::<line::Params>(),
+                &offsets!(line::Params; pair_count as "pair_count", follow_per_mm as "follow_per_mm",
+                    visible_mm as "visible_mm", level as "level", share as "share",
+                    share_coarser as "share_coarser", pairs as "pairs"),
+            );
+            assert_eq!(validated_workgroups(&shader), [("scatter".into(), [128, 1, 1])]);
+        }
     }
+    assert_eq!(validated_workgroups(gauss::HALVE), [("halve".into(), [16, 16, 1])]);
     for method in [jitter::METHOD, disk::METHOD, exact::METHOD] {
         let shader = gather::shader(method);
         assert_eq!(validated_workgroups(&shader), [("scatter".into(), [8, 8, 1])]);
@@ -321,16 +330,12 @@ fn gaussians_agree_with_their_equations() {
     for terms in [4, 6] {
         let profile = if terms == 4 { Arc::new(Profile::jimenez_four()) } else { skin() };
         let frame = hostile(5);
-        let steps = gauss::steps(&gauss::gaussians(&profile, terms).unwrap());
-        let expected = TAP_SHIFTS.map(|shift| {
-            let (mut blurred, mut sum) = (frame.clone(), frame.clone());
-            for step in &steps {
-                let (taps, width) = (gauss::taps(step.deviation_mm), step.deviation_mm);
-                blurred = blurred.line(&taps, width, 0, shift).line(&taps, width, 1, shift);
-                sum = sum.mix(&blurred, step.share);
-            }
-            sum
-        });
+        let gaussians = gauss::gaussians(&profile, terms).unwrap();
+        let plan = gauss::plan(&gaussians, 900.0 / 431.0);
+        assert!(plan.len() > 1 && !plan[0].steps.is_empty(), "{plan:?}");
+        // Means of depths are rounded to halves, by up to 1/32 mm here: the plane of a texel is that much unsure.
+        let unsure = [0.0, -1.0 / 32.0, 1.0 / 32.0];
+        let expected = [0, 1, 2].map(|i| frame.gaussians(&plan, TAP_SHIFTS[i], unsure[i]));
         let found = run(gpu, ScatterMethod::ScreenGauss(terms as u32), &profile, &frame);
         assert_between("screen-gauss", &found, expected.each_ref(), 6e-3);
     }
@@ -338,7 +343,10 @@ fn gaussians_agree_with_their_equations() {
 
 #[test]
 fn accumulated_weights_are_those_of_table_4_2() {
-    let steps = gauss::steps(&gauss::gaussians(&skin(), 6).unwrap());
+    // So few pixels a millimetre that every Gaussian runs on the view itself.
+    let plan = gauss::plan(&gauss::gaussians(&skin(), 6).unwrap(), 0.1);
+    let steps = &plan[0].steps;
+    assert_eq!((plan.len(), steps.len()), (1, 5));
     let printed =
         [[0.3, 0.424, 0.346], [0.261, 0.2, 0.0], [0.2, 0.007, 0.007], [0.388, 0.004, 0.0], [0.078, 0.0, 0.0]];
     for (step, printed) in steps.iter().zip(printed) {
@@ -419,9 +427,10 @@ fn energy_on_a_plane_is_kept() {
 #[test]
 fn mirrored_light_scatters_mirrored() {
     let Some(gpu) = gpu() else { return };
+    // Halved images mirror where their pixels do: sizes are multiples of 8.
     let frame = |flip: bool| {
-        Frame::new([51, 27], 800.0, |x, y| {
-            let x = if flip { 50 - x } else { x };
+        Frame::new([56, 24], 800.0, |x, y| {
+            let x = if flip { 55 - x } else { x };
             ([if x < 20 { 1.0 } else { 0.0 }, (y % 5) as f64, 0.3], 1.0, 400.0)
         })
     };
@@ -430,9 +439,9 @@ fn mirrored_light_scatters_mirrored() {
         [ScatterMethod::Separable(17), ScatterMethod::ScreenGauss(6), ScatterMethod::ReferenceScreen]
     {
         let [a, b] = [false, true].map(|flip| run(gpu, method, &skin(), &frame(flip)));
-        for y in 0..27 {
-            for x in 0..51 {
-                let (p, q) = (a[y * 51 + x], b[y * 51 + 50 - x]);
+        for y in 0..24 {
+            for x in 0..56 {
+                let (p, q) = (a[y * 56 + x], b[y * 56 + 55 - x]);
                 assert!(
                     (0..3).all(|c| (p[c] - q[c]).abs() <= 2e-3 * p[c].abs() + 1e-6),
                     "{method} {p:?} {q:?}"

@@ -1,14 +1,18 @@
 // One direction of a separable kernel. Concatenated after view.wgsl, common.wgsl and the constants VERTICAL (which
-// direction) and ACCUMULATE (whether the result is also blended into a sum).
+// direction) and LEVELS (whether the image may be smaller than the view). Lines that begin with //ACCUMULATE are of a
+// pass that also blends its result into a sum, those with //COARSER of one that adds the sum of the next level to it.
 
 struct Params {
     pair_count: u32,
     follow_per_mm: f32,
     // A pixel on which this is shorter than half a pixel keeps its light.
     visible_mm: f32,
-    padding: f32,
+    // A pixel of the image is 2^level pixels of the view.
+    level: u32,
     // rgb = share of the result in the sum (papers/004 eq. 4.8).
     share: vec4f,
+    // rgb = share of the next level's sum, w = its visible_mm.
+    share_coarser: vec4f,
     // rgb = weight of a tap on either side, w = its offset in mm, ascending. The centre has what is left to one.
     pairs: array<vec4f, 32>,
 }
@@ -24,12 +28,15 @@ struct Params {
 @group(0) @binding(6) var target_image: texture_storage_2d<rgba16float, write>;
 //ACCUMULATE @group(0) @binding(7) var sum_before: texture_2d<f32>;
 //ACCUMULATE @group(0) @binding(8) var sum_after: texture_storage_2d<rgba16float, write>;
+//COARSER @group(0) @binding(9) var coarser: texture_2d<f32>;
 
 // A sample as near to the tangent plane as this, or as a surface with a radius of 25 mm would be, is of one surface.
 const PLANE_MM = 0.1;
 const CURVATURE_PER_MM = 0.02;
 // One that is farther than this has nothing of skin.
 const ALL_FAR_MM = 0.99 * FAR_MM;
+// Depth that the pixels of one texel of a level may differ by.
+const ONE_SURFACE_MM = 4.0;
 
 const THREADS = 128u;
 // A workgroup does 4 x 1 blocks of 8 x 8 pixels.
@@ -49,17 +56,56 @@ fn scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     for (var i = thread; i < BLOCKS_IN_GROUP * BLOCK_PIXELS; i += THREADS) {
         let block = vec2u(BLOCKS_IN_GROUP * group.x + i / BLOCK_PIXELS, group.y);
         let at = 8u * block + z_order(i % BLOCK_PIXELS);
-        if all(at < view.size) {
+        if all(at < image_size()) {
             put(vec2i(at), blur(vec2i(at)));
         }
     }
 }
 
+fn image_size() -> vec2u {
+    if LEVELS {
+        return textureDimensions(source);
+    }
+    return view.size;
+}
+
 fn put(at: vec2i, color: vec4f) {
     textureStore(target_image, at, color);
-    //ACCUMULATE let before = textureLoad(sum_before, at, 0);
-    //ACCUMULATE textureStore(sum_after, at, vec4f(before.rgb + params.share.rgb * (color.rgb - before.rgb), color.a));
+    //ACCUMULATE let before = textureLoad(sum_before, at, 0).rgb;
+    //ACCUMULATE var sum = before + params.share.rgb * (color.rgb - before);
+    //COARSER sum += params.share_coarser.rgb * coarser_change(at, vec4f(sum, color.a));
+    //ACCUMULATE textureStore(sum_after, at, vec4f(sum, color.a));
 }
+
+//COARSER // What the next level's sum changes at a pixel. A texel of it is 2 x 2 pixels; between texels it is bilinear
+//COARSER // where they are on one surface, else each goes by its own depth.
+//COARSER fn coarser_change(at: vec2i, center: vec4f) -> vec3f {
+//COARSER     if center.a >= NO_SKIN_MM {
+//COARSER         return vec3f(0.0);
+//COARSER     }
+//COARSER     if params.level == 0u {
+//COARSER         let per_mm = pixels_per_mm(view, center.a + view.depth_origin_mm);
+//COARSER         if textureLoad(albedo, at, 0).a * per_mm * params.share_coarser.w < 0.5 {
+//COARSER             return vec3f(0.0);
+//COARSER         }
+//COARSER     }
+//COARSER     let size = vec2f(textureDimensions(coarser));
+//COARSER     let place = 0.5 * vec2f(at) + 0.25;
+//COARSER     let light = textureSampleLevel(coarser, linear, place / size, 0.0);
+//COARSER     if abs(light.a - center.a) <= PLANE_MM || light.a > ALL_FAR_MM {
+//COARSER         return change(light, center, center.a);
+//COARSER     }
+//COARSER     let low = vec2i(floor(place - 0.5));
+//COARSER     let t = place - 0.5 - vec2f(low);
+//COARSER     let upper = mix(coarser_texel(low, center), coarser_texel(low + vec2i(1, 0), center), t.x);
+//COARSER     let lower = mix(coarser_texel(low + vec2i(0, 1), center), coarser_texel(low + 1, center), t.x);
+//COARSER     return mix(upper, lower, t.y);
+//COARSER }
+//COARSER
+//COARSER fn coarser_texel(at: vec2i, center: vec4f) -> vec3f {
+//COARSER     let inside = clamp(at, vec2i(0), vec2i(textureDimensions(coarser)) - 1);
+//COARSER     return change(textureLoad(coarser, inside, 0), center, center.a);
+//COARSER }
 
 fn depth_at(at: vec2i) -> f32 {
     return depth_mm(view, textureLoad(depth, clamp(at, vec2i(0), vec2i(view.size) - 1), 0));
@@ -72,18 +118,21 @@ fn change(light: vec4f, center: vec4f, expected_mm: f32) -> vec3f {
 }
 
 fn texel(at: vec2i) -> vec4f {
-    return textureLoad(source, clamp(at, vec2i(0), vec2i(view.size) - 1), 0);
+    return textureLoad(source, clamp(at, vec2i(0), vec2i(image_size()) - 1), 0);
 }
 
 // A tap x pixels along the line. On the tangent plane one bilinear sample of light and depth is enough; off it, the two
 // texels may be of two surfaces, and each goes by its own depth.
 fn tap(at: vec2i, x: f32, center: vec4f, slope: f32, plane_mm: f32) -> vec3f {
     let axis = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
-    let place = (vec2f(at) + 0.5 + x * vec2f(axis)) / vec2f(view.size);
-    let light = textureSampleLevel(source, linear, place, 0.0);
-    let expected_mm = center.a + slope * x;
-    if abs(light.a - expected_mm) <= plane_mm || light.a > ALL_FAR_MM {
-        return change(light, center, expected_mm);
+    // Texels of a level are few and wide: there each always goes by its own depth.
+    if !LEVELS {
+        let place = (vec2f(at) + 0.5 + x * vec2f(axis)) / vec2f(image_size());
+        let light = textureSampleLevel(source, linear, place, 0.0);
+        let expected_mm = center.a + slope * x;
+        if abs(light.a - expected_mm) <= plane_mm || light.a > ALL_FAR_MM {
+            return change(light, center, expected_mm);
+        }
     }
     let low = floor(x);
     let before = change(texel(at + i32(low) * axis), center, center.a + slope * low);
@@ -97,15 +146,37 @@ fn blur(at: vec2i) -> vec4f {
         return raw;
     }
     let center = vec4f(min(raw.rgb, vec3f(HALF_MAX)), raw.a);
-    let strength = textureLoad(albedo, at, 0).a;
-    let here = depth_at(at);
+    let axis = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
+    var strength: f32;
+    // The middle of the pixel in pixels of the view.
+    var middle = at;
+    // Pixels of the view across this one.
+    var across = 1.0;
+    if LEVELS {
+        middle = (at << vec2u(params.level)) + (1 << (params.level - 1u));
+        across = f32(1u << params.level);
+        let around = textureGather(3, albedo, linear, vec2f(middle) / vec2f(view.size));
+        strength = max(max(around.x, around.y), max(around.z, around.w));
+    } else {
+        strength = textureLoad(albedo, at, 0).a;
+    }
+    var here = depth_at(middle);
+    var slope = surface_slope(depth_at(middle - axis), here, depth_at(middle + axis), pixels_per_mm(view, here));
+    if LEVELS {
+        // The middle may be of another surface than the light.
+        let mean = center.a + view.depth_origin_mm;
+        if abs(here - mean) >= ONE_SURFACE_MM {
+            here = mean;
+            slope = 0.0;
+        }
+    }
     let per_mm = pixels_per_mm(view, here);
-    if strength <= 0.0 || strength * per_mm * params.visible_mm < 0.5 {
+    let kernel_per_mm = strength * per_mm / across;
+    if kernel_per_mm * params.visible_mm < 0.5 {
         return center;
     }
-    let axis = select(vec2i(1, 0), vec2i(0, 1), VERTICAL);
-    let slope = surface_slope(depth_at(at - axis), here, depth_at(at + axis), per_mm);
-    let scale = strength * per_mm * foreshortening(slope, per_mm);
+    let scale = kernel_per_mm * foreshortening(slope, per_mm);
+    slope *= across;
     var result = center.rgb;
     for (var i = 0u; i < params.pair_count; i++) {
         let pair = params.pairs[i];

@@ -34,8 +34,9 @@ pub(crate) struct Params {
     pub(crate) pair_count: u32,
     pub(crate) follow_per_mm: f32,
     pub(crate) visible_mm: f32,
-    pub(crate) padding: f32,
+    pub(crate) level: u32,
     pub(crate) share: [f32; 4],
+    pub(crate) share_coarser: [f32; 4],
     pub(crate) pairs: [[f32; 4]; MAX_PAIRS],
 }
 
@@ -51,22 +52,38 @@ impl Params {
             pair_count: side.len().min(MAX_PAIRS) as u32,
             follow_per_mm: FOLLOW_PER_MM,
             visible_mm: visible_mm as f32,
-            padding: 0.0,
+            level: 0,
             share: [share[0] as f32, share[1] as f32, share[2] as f32, 0.0],
+            share_coarser: [0.0; 4],
             pairs,
         }
     }
 }
 
-/// WGSL of one direction.
-pub(crate) fn shader(vertical: bool, accumulate: bool) -> String {
-    let source = concat!(
+/// What a pass does with its result besides writing it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Sum {
+    None,
+    /// Blends it into a sum.
+    Own,
+    /// As `Own`, and adds the sum of the next level.
+    WithCoarser,
+}
+
+/// WGSL of one direction; `levels` for images that may be smaller than the view.
+pub(crate) fn shader(vertical: bool, levels: bool, sum: Sum) -> String {
+    let mut source = concat!(
         include_str!("../../../shared/view.wgsl"),
         include_str!("../common.wgsl"),
         include_str!("line.wgsl")
-    );
-    let source = if accumulate { source.replace("//ACCUMULATE ", "") } else { source.to_owned() };
-    format!("const VERTICAL = {vertical};\n{source}")
+    )
+    .to_owned();
+    for (of, mark) in [(Sum::Own, "//ACCUMULATE "), (Sum::WithCoarser, "//COARSER ")] {
+        if sum >= of {
+            source = source.replace(mark, "");
+        }
+    }
+    format!("const VERTICAL = {vertical};\nconst LEVELS = {levels};\n{source}")
 }
 
 /// A pipeline for one direction.
@@ -77,7 +94,7 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    pub(crate) fn new(gpu: &Gpu, vertical: bool, accumulate: bool) -> Self {
+    pub(crate) fn new(gpu: &Gpu, vertical: bool, levels: bool, sum: Sum) -> Self {
         let name = if vertical { "scatter vertical" } else { "scatter horizontal" };
         let linear = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some(name),
@@ -85,11 +102,11 @@ impl Line {
             min_filter: wgpu::FilterMode::Linear,
             ..Default::default()
         });
-        let pipeline = gpu.compute_pipeline(name, &shader(vertical, accumulate), "scatter");
+        let pipeline = gpu.compute_pipeline(name, &shader(vertical, levels, sum), "scatter");
         Self { pipeline, name, linear }
     }
 
-    /// Blurs `source` into `target`; `sum` is (before, after) for a pipeline that accumulates.
+    /// Blurs `source` into `target`; `sums` are before and after for a pipeline that sums up, and what is coarser.
     pub(crate) fn record(
         &self,
         gpu: &Gpu,
@@ -99,7 +116,7 @@ impl Line {
         params: &wgpu::Buffer,
         images: &Images<'_>,
         [source, target]: [&wgpu::TextureView; 2],
-        sum: Option<[&wgpu::TextureView; 2]>,
+        sums: &[&wgpu::TextureView],
     ) {
         let texture = wgpu::BindingResource::TextureView;
         let mut resources = vec![
@@ -111,7 +128,7 @@ impl Line {
             wgpu::BindingResource::Sampler(&self.linear),
             texture(target),
         ];
-        resources.extend(sum.into_iter().flatten().map(texture));
+        resources.extend(sums.iter().copied().map(texture));
         let group = gpu.bind(self.name, &self.pipeline, 0, &resources);
         let mut pass = timer.compute(encoder, self.name);
         pass.set_pipeline(&self.pipeline);
