@@ -115,9 +115,9 @@ const HAIRLINE: [[f32; 2]; 28] = [
 /// Outline of the ear seen from its side: (z, y), mm, from the root of the helix over the top.
 const EAR: [[f32; 2]; 18] = [
     [-4.0, -8.0],
-    [-8.0, -3.2],
-    [-14.0, 0.9],
-    [-20.0, 1.9],
+    [-8.0, -2.2],
+    [-13.0, 1.8],
+    [-20.0, 3.0],
     [-28.0, -2.0],
     [-34.5, -11.0],
     [-38.0, -20.5],
