@@ -74,16 +74,30 @@ impl Hairs {
         if beard > 0.01 {
             clear *= 1.0 - self.cropped(place, 0.95, 0.12, beard);
         }
-        // The edge is ragged at the scale of tufts and thins out over two centimetres.
-        let height = above_hairline(plan(place))
-            + 2.6 * noise(place, 19.0, self.seed ^ 9)
-            + 1.5 * noise(place, 5.0, self.seed ^ 16)
-            + 1.1 * noise(place, 2.2, self.seed ^ 10);
-        let scalp = self.scalp * smoothstep(-7.0, 12.0, height) * (1.0 - smoothstep(0.9, 1.0, r.ear));
+        let scalp = self.scalp_density(place, r);
         if scalp > 0.01 {
             clear *= 1.0 - self.cropped_strokes(place, scalp);
         }
         1.0 - clear
+    }
+
+    /// Density of the scalp's hair, 0 to 1.
+    fn scalp_density(&self, place: Vec3, r: &Regions) -> f32 {
+        let line = above_hairline(plan(place));
+        if line < -14.0 || self.scalp <= 0.0 {
+            return 0.0;
+        }
+        // At forehead and temples the edge wanders and thins out over a centimetre and a half, at the nape a little less;
+        // before and behind the ear it is close.
+        let soft = smoothstep(2.0, 34.0, place.y).max(0.7 * smoothstep(-40.0, -58.0, place.y));
+        let wander = 1.7 * noise(place, 19.0, self.seed ^ 9)
+            + 0.9 * noise(place, 5.0, self.seed ^ 16)
+            + 0.8 * noise(place, 2.2, self.seed ^ 10);
+        let height = line + (0.35 + 0.65 * soft) * wander;
+        let edge = smoothstep(-2.5 - 4.0 * soft, 4.5 + 10.5 * soft, height);
+        // Cut shorter towards the edge, as clippers leave it.
+        let cut = 0.86 + 0.14 * smoothstep(3.0, 26.0, height);
+        self.scalp * edge * cut * (1.0 - r.ear)
     }
 
     /// Short strokes that lie along the growth of the scalp's hair, dense where `density` is high.
@@ -100,9 +114,12 @@ impl Hairs {
         let coarse = noise(squeezed(5.0), 0.9, self.seed ^ 14);
         let tufts = noise(place, 6.0, self.seed ^ 15);
         let strokes = smoothstep(-1.0, 0.9, fine + 0.5 * coarse + 0.1 * tufts + 3.4 * (density - 0.55));
-        // Skin shimmers through what is cropped, unevenly; single hairs are drawn over it.
-        let uneven = 1.0 + 0.05 * noise(place, 14.0, self.seed ^ 17) + 0.03 * tufts;
-        (0.66 * density * density * uneven + 0.24 * strokes * smoothstep(0.0, 0.5, density)).clamp(0.0, 0.92)
+        // Skin shimmers through what is cropped, unevenly: what is seen of it varies, not what is hidden, or dense hair would
+        // have pale patches. Single hairs are drawn over it.
+        let there = smoothstep(0.0, 0.5, density);
+        let uneven = 1.0 + there * (0.16 * noise(place, 14.0, self.seed ^ 17) + 0.12 * tufts);
+        let bare = (1.0 - density * density) * (1.0 - 0.45 * strokes * there) * uneven;
+        1.0 - bare.clamp(0.04, 1.0)
     }
 
     /// Cut hairs as dots over a tint.
@@ -198,4 +215,55 @@ fn brow_hair(stream: &mut Stream) -> (Hair, [Vec2; 4]) {
         opacity: stream.range(0.55, 0.95) * (1.0 - 0.35 * upright) * (1.0 - 0.25 * edge),
     };
     (hair, knots)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scalp(x: f32, y: f32, z: f32) -> f32 {
+        let hairs = Hairs::new(&Options { scalp_hair: 0.95, ..Options::default() }, 0.2);
+        let place = Vec3::new(x, y, z);
+        let [left, right] = [1.0, -1.0].map(|side| {
+            let place = place * Vec3::new(side, 1.0, 1.0);
+            hairs.scalp_density(place, &Regions::at(place))
+        });
+        assert!((left - right).abs() < 0.6, "{place}: {left} and {right}");
+        left.min(right)
+    }
+
+    #[test]
+    fn the_ear_is_bald_and_hair_is_close_about_it() {
+        // Helix, anthelix, concha, lobe, tragus and where the helix leaves the head.
+        for (x, y, z) in [
+            (88.0, -1.5, -20.0),
+            (90.0, -12.0, -32.0),
+            (91.0, -24.0, -35.0),
+            (86.0, -15.0, -24.0),
+            (75.0, -28.0, -16.0),
+            (83.0, -47.0, -13.0),
+            (76.0, -28.0, -6.0),
+            (79.0, -6.0, -8.0),
+            (81.0, -10.0, -9.0),
+        ] {
+            assert!(scalp(x, y, z) < 0.02, "hair on the ear at {x} {y} {z}");
+        }
+        // Above it, behind it, and before it: the sideburn.
+        for (x, y, z) in [(79.0, 9.0, -20.0), (76.0, -8.0, -46.0), (74.0, -25.0, -52.0), (75.0, -12.0, 11.0)]
+        {
+            assert!(scalp(x, y, z) > 0.55, "no hair about the ear at {x} {y} {z}: {}", scalp(x, y, z));
+        }
+    }
+
+    #[test]
+    fn the_sideburn_ends_at_the_middle_of_the_ear() {
+        assert!(scalp(75.0, -19.0, 11.0) > 0.5);
+        for (x, y, z, place) in [
+            (75.0, -34.0, 11.0, "below"),
+            (73.0, -12.0, 27.0, "on the cheek before"),
+            (76.0, -20.0, -1.0, "between it and the tragus"),
+        ] {
+            assert!(scalp(x, y, z) < 0.05, "{place}: {}", scalp(x, y, z));
+        }
+    }
 }

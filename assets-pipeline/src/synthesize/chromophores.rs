@@ -60,8 +60,8 @@ impl Chromophores {
         noise(place, wavelength_mm, self.seed ^ seed)
     }
 
-    /// Melanin volume fraction of the epidermis without hair.
-    pub(crate) fn melanin(&self, place: Vec3, r: &Regions, cavity: f32) -> f32 {
+    /// Melanin volume fraction of the epidermis without hair. A hollow ([`Regions::hollow`]) holds what stands for its depth.
+    pub(crate) fn melanin(&self, place: Vec3, r: &Regions, cavity: f32, hollow: f32) -> f32 {
         let uneven = 0.055 * self.noise(place, 28.0, 1)
             + 0.045 * self.noise(place, 9.0, 2)
             + 0.05 * self.noise(place, 3.2, 3)
@@ -80,7 +80,9 @@ impl Chromophores {
             + 0.05 * r.ear
             - 0.05 * r.lips
             - 0.5 * r.inner;
-        let mut fraction = self.melanin * (uneven + regional + 0.10 * cavity).exp();
+        // Dark skin is of one piece: the same relative change of melanin is seen more on it.
+        let even = 1.0 / (1.0 + 2.5 * self.melanin);
+        let mut fraction = self.melanin * (even * (uneven + regional) + 0.10 * cavity).exp();
         let spots = self.freckle_weight(place, r);
         // Freckles matter on light skin and drown in dark.
         fraction += spots * self.freckles * 0.045 * (-self.melanin / 0.12).exp();
@@ -95,7 +97,7 @@ impl Chromophores {
                 }
             }
         }
-        fraction
+        fraction + 0.42 * hollow
     }
 
     /// Density of freckles' pigment, about 0 to 1.
@@ -136,7 +138,7 @@ impl Chromophores {
     }
 
     /// Local mean of the neutral hemoglobin fraction of the dermis.
-    pub(crate) fn hemoglobin_mean(&self, place: Vec3, r: &Regions) -> f32 {
+    pub(crate) fn hemoglobin_mean(&self, place: Vec3, r: &Regions, hollow: f32) -> f32 {
         let lobe = (-((place.y + 38.0) / 10.0).powi(2)).exp() * r.ear;
         let relative = 0.52 * r.cheek
             + 0.26 * r.cheek_bone
@@ -148,7 +150,7 @@ impl Chromophores {
             + 0.55 * r.ear
             + 0.30 * r.ear_rim
             + 0.15 * lobe
-            + 0.35 * r.eye_corner
+            + 0.55 * r.eye_corner
             + 0.16 * r.under_eye
             + 0.10 * r.glabella
             - 0.16 * r.forehead
@@ -159,7 +161,7 @@ impl Chromophores {
             - 0.12 * r.neck
             - 0.10 * r.scalp;
         let drift = 0.06 * self.noise(place, 32.0, 21) + 0.07 * self.noise(place, 13.0, 22);
-        let red = 1.42 * r.lips + 1.2 * r.inner * (1.0 - r.lips) + 0.10 * r.lip_border;
+        let red = 1.42 * r.lips + 1.2 * r.inner * (1.0 - r.lips) + 0.10 * r.lip_border + 1.1 * hollow;
         self.hemoglobin * (relative * (1.0 - r.lips) + drift * (1.0 - 0.6 * r.lips) + red).exp()
     }
 
@@ -191,9 +193,9 @@ impl Chromophores {
     }
 
     /// Local mean and value of the neutral hemoglobin volume fraction `H_n`.
-    pub(crate) fn hemoglobin_with_mean(&self, place: Vec3, r: &Regions) -> (f32, f32) {
+    pub(crate) fn hemoglobin_with_mean(&self, place: Vec3, r: &Regions, hollow: f32) -> (f32, f32) {
         let variation = (self.hemoglobin_spread(r) * self.mottling(place, r)).max(-0.85);
-        let mean = self.hemoglobin_mean(place, r);
+        let mean = self.hemoglobin_mean(place, r, hollow);
         (mean, mean * (1.0 + variation))
     }
 }

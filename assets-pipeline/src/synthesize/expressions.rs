@@ -15,7 +15,7 @@ use rubor_rig::mask::Mask;
 
 use super::noise::{Stream, noise};
 use super::regions::Regions;
-use super::surface::Coverage;
+use super::surface::{Coverage, Site};
 
 /// Relative change of the mean hemoglobin by region, and how much patchier it becomes.
 struct State {
@@ -199,7 +199,7 @@ pub(crate) fn distributions(
     radius_px: u32,
     size: u32,
     seed: u32,
-    hemoglobin: impl Fn(Vec3) -> (Regions, f32, f32) + Sync,
+    hemoglobin: impl Fn(&Site) -> (Regions, f32, f32) + Sync,
 ) -> Result<(Map, Vec<Distribution>), HemoglobinError> {
     let mut stream = Stream::new(seed ^ 0x51de);
     let sides: Vec<f32> = STATES.iter().map(|_| (0.045 * stream.normal()).clamp(-0.09, 0.09)).collect();
@@ -207,9 +207,9 @@ pub(crate) fn distributions(
     let sites: Vec<Option<Neutral>> = (0..side * side)
         .into_par_iter()
         .map(|i| {
-            let place = coverage.site(i % side, i / side)?.place;
-            let (r, mean, value) = hemoglobin(place);
-            Some((place, r, mean, value))
+            let site = coverage.site(i % side, i / side)?;
+            let (r, mean, value) = hemoglobin(&site);
+            Some((site.place, r, mean, value))
         })
         .collect();
     let mask = Mask { width: side, height: side, mapped: sites.iter().map(Option::is_some).collect() };

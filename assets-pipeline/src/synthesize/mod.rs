@@ -214,8 +214,11 @@ fn synthesize_with(
             if Wrinkles::reach(site.place) { site.slopes(wrinkles.gradient(site.place)) } else { [0.0; 2] };
         let hair = half_hairs.cover(site.place, &r);
         let cavity = half_relief.sample(site, &r).cavity;
+        let hollow = r.hollow(site.open);
         let [intensity, roughness] = specular::specular(site.place, &r, cavity, hair, seed);
-        [x, y, intensity, roughness, 1.0 - 0.7 * hair]
+        // Light that enters a hollow is not given back beside it.
+        let scattering = (1.0 - 0.7 * hair) * (1.0 - 0.8 * hollow);
+        [x, y, intensity * (1.0 - 0.85 * hollow), roughness, scattering]
     });
     let scattering = broad.pop();
     let specular = broad.pop();
@@ -229,8 +232,9 @@ fn synthesize_with(
         let r = Regions::at(site.place);
         let relief = relief.sample(site, &r);
         let hair = hairs.cover(site.place, &r);
-        let melanin = chromophores.melanin(site.place, &r, relief.cavity);
-        let (_, hemoglobin) = chromophores.hemoglobin_with_mean(site.place, &r);
+        let hollow = r.hollow(site.open);
+        let melanin = chromophores.melanin(site.place, &r, relief.cavity, hollow);
+        let (_, hemoglobin) = chromophores.hemoglobin_with_mean(site.place, &r, hollow);
         let [mut x, mut y] = site.slopes(relief.gradient);
         if let Some(map) = wrinkle_slopes.first() {
             // Both maps have the same texture frame, so slopes simply add.
@@ -248,9 +252,9 @@ fn synthesize_with(
     let texel_mm = surface.texel_mm(STATISTICS_RESOLUTION);
     let radius_px = (STATISTICS_RADIUS_MM / texel_mm).round().clamp(2.0, 64.0) as u32;
     let (hemoglobin_mean, distributions) =
-        expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |place| {
-            let r = Regions::at(place);
-            let (mean, value) = chromophores.hemoglobin_with_mean(place, &r);
+        expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |site| {
+            let r = Regions::at(site.place);
+            let (mean, value) = chromophores.hemoglobin_with_mean(site.place, &r, r.hollow(site.open));
             (r, mean, value)
         })?;
     let masks = surface.rasterise(MASK_RESOLUTION);
@@ -275,12 +279,13 @@ fn synthesize_with(
     })
 }
 
-/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to blond (0.1) and black-brown (0.5). Grey hair
-/// is a mix of hairs with pigment and of white ones.
+/// Albedo of hair: more melanin is darker and, first, redder. Fitted by eye to golden blond (0.1), copper (0.24) and black
+/// (0.5). Grey hair is a mix of hairs with pigment and of white ones.
 fn hair_color_linear(melanin: f32, grey: f32) -> [f32; 3] {
-    let white = [0.26, 0.235, 0.205];
-    let pigmented =
-        [(0.80, 8.0), (0.72, 8.8), (0.60, 9.6)].map(|(root, k): (f32, f32)| root * (-k * melanin).exp());
+    let white = [0.27, 0.23, 0.185];
+    let red = (-((melanin - 0.24) / 0.09).powi(2)).exp();
+    let pigmented = [(0.80, 8.0, 0.0), (0.66, 8.6, 0.36), (0.46, 8.8, 0.66)]
+        .map(|(root, k, taken): (f32, f32, f32)| root * (-k * melanin).exp() * (1.0 - taken * red));
     std::array::from_fn(|i| pigmented[i] + grey * (white[i] - pigmented[i]))
 }
 

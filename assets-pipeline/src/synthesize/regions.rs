@@ -13,7 +13,7 @@ pub(crate) struct Regions {
     /// Red of the lips, and the band where it meets the skin.
     pub lips: f32,
     pub lip_border: f32,
-    /// Lining behind the lips, inside the nostrils and behind the lids.
+    /// Lining behind the lips and behind the lids, and the caruncle.
     pub inner: f32,
     /// Skin of both lids; their edges; the hollow below the eye; its inner corner.
     pub lids: f32,
@@ -38,6 +38,9 @@ pub(crate) struct Regions {
     pub neck: f32,
     pub ear: f32,
     pub ear_rim: f32,
+    /// Opening of the nostril and what lies behind it; opening of the ear canal.
+    pub nostril: f32,
+    pub ear_canal: f32,
     /// Inside the hairline.
     pub scalp: f32,
 }
@@ -76,25 +79,79 @@ const LIP_TOP: [[f32; 2]; 8] = [
 /// Lower border.
 const LIP_BOTTOM: [[f32; 2]; 6] =
     [[0.0, -80.6], [5.0, -80.4], [10.0, -79.6], [15.0, -77.9], [20.0, -75.2], [24.0, -72.2]];
-/// Hairline: plan (|s|, y), mm; above it grows scalp hair. It comes down before the ear (sideburn), passes over it
-/// and goes round to the neck.
-const HAIRLINE: [[f32; 2]; 15] = [
+/// Outline of the scalp hair on the plan (|s|, y), mm: up the forehead to the recess, forwards to the peak of the temple,
+/// back to the sideburn, down before the ear to its middle, close over the ear, down behind it and round the nape. The
+/// last corners close it beyond the middle and above the head.
+const HAIRLINE: [[f32; 2]; 28] = [
+    [-40.0, 65.0],
     [0.0, 66.0],
-    [26.0, 69.5],
-    [48.0, 71.0],
+    [26.0, 69.0],
+    [44.0, 71.0],
+    [56.0, 66.0],
     [64.0, 54.0],
-    [70.0, 40.0],
-    [80.0, 26.0],
-    [90.0, 6.0],
-    [99.0, -14.0],
-    [108.0, -26.0],
-    [117.0, -28.0],
-    [128.0, -10.0],
-    [148.0, -4.0],
-    [164.0, -30.0],
-    [190.0, -62.0],
-    [251.0, -72.0],
+    [70.0, 41.0],
+    [77.0, 29.0],
+    [88.0, 17.0],
+    [98.0, 7.0],
+    [103.5, -3.0],
+    [105.5, -14.0],
+    [106.5, -24.0],
+    [114.0, -26.0],
+    [121.5, -25.0],
+    [124.0, -12.0],
+    [127.0, -4.5],
+    [132.5, -1.0],
+    [139.0, 1.6],
+    [147.0, 2.2],
+    [154.0, -2.0],
+    [159.5, -12.0],
+    [165.0, -25.0],
+    [170.0, -42.0],
+    [196.0, -64.0],
+    [292.0, -72.0],
+    [292.0, 140.0],
+    [-40.0, 140.0],
 ];
+/// Outline of the ear seen from its side: (z, y), mm, from the root of the helix over the top.
+const EAR: [[f32; 2]; 18] = [
+    [-4.0, -8.0],
+    [-8.0, -2.2],
+    [-13.0, 1.8],
+    [-20.0, 3.0],
+    [-28.0, -2.0],
+    [-34.5, -11.0],
+    [-38.0, -20.5],
+    [-37.0, -28.5],
+    [-30.5, -37.0],
+    [-23.0, -45.0],
+    [-18.0, -50.5],
+    [-11.0, -52.0],
+    [-4.0, -49.0],
+    [-1.0, -42.0],
+    [-4.0, -34.0],
+    [-4.5, -26.0],
+    [-2.0, -18.0],
+    [-2.5, -12.0],
+];
+
+/// Signed distance to a closed outline, negative inside.
+fn outline_distance(outline: &[[f32; 2]], p: Vec2) -> f32 {
+    let mut nearest = f32::MAX;
+    let mut inside = false;
+    let mut a = Vec2::from_array(outline[outline.len() - 1]);
+    for b in outline {
+        let b = Vec2::from_array(*b);
+        let edge = b - a;
+        let t = ((p - a).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+        nearest = nearest.min((p - a - t * edge).length_squared());
+        // A ray to the right crosses the outline an odd number of times from inside.
+        if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / edge.y * edge.x {
+            inside = !inside;
+        }
+        a = b;
+    }
+    if inside { -nearest.sqrt() } else { nearest.sqrt() }
+}
 
 /// Approximate signed distance to the opening between the lids, mm, positive on the skin; and true above it.
 pub(crate) fn eye_distance(p: Vec2) -> (f32, bool) {
@@ -112,16 +169,34 @@ pub(crate) fn eye_distance(p: Vec2) -> (f32, bool) {
     (if beyond > 0.0 && vertical <= 0.0 { beyond } else { distance }, above)
 }
 
-/// Signed distance to the hairline, mm, negative on the face. Where the line is steep, as before the ear, height over it
-/// would be many times the distance.
+/// Distance (mm) over the line along which the upper lid folds, and how deep the fold is there, 0 to 1.
+pub(crate) fn lid_fold(p: Vec2) -> (f32, f32) {
+    let t = (p.x.abs() - 20.0) / 27.5;
+    let (eye, above) = eye_distance(p);
+    let arch = (4.0 * t * (1.0 - t)).max(0.0);
+    let depth = smoothstep(0.02, 0.3, t) * smoothstep(1.12, 0.8, t) * f32::from(above);
+    (eye - 2.6 - 3.4 * arch, depth)
+}
+
+/// Signed distance to the hairline, mm, negative on the face; far from the line only the sign counts.
 pub(crate) fn above_hairline(p: Vec2) -> f32 {
-    const HALF_STEP_MM: f32 = 7.0;
-    let s = p.x.abs();
-    let at = |s: f32| through(&HAIRLINE, s);
-    // Knots are corners; the mean over a step rounds them.
-    let mean = 0.25 * (at((s - HALF_STEP_MM).abs()) + 2.0 * at(s) + at(s + HALF_STEP_MM));
-    let slope = (at(s + HALF_STEP_MM) - at(s - HALF_STEP_MM)) / (2.0 * HALF_STEP_MM);
-    (p.y - mean) / (1.0 + slope * slope).sqrt()
+    const FAR_MM: f32 = 25.0;
+    let p = Vec2::new(p.x.abs(), p.y);
+    if p.y > 71.0 + FAR_MM {
+        FAR_MM
+    } else if p.y < -72.0 - FAR_MM || (p.x < 78.0 && p.y < 29.0 - FAR_MM) {
+        -FAR_MM
+    } else {
+        -outline_distance(&HAIRLINE, p).clamp(-FAR_MM, FAR_MM)
+    }
+}
+
+/// How much a place (x >= 0) belongs to the ear. What the ear hides of the skull seen from the side counts too.
+fn ear_weight(c: Vec3) -> f32 {
+    if !(60.0..110.0).contains(&c.x) || !(-42.0..4.0).contains(&c.z) || !(-58.0..6.0).contains(&c.y) {
+        return 0.0;
+    }
+    smoothstep(2.4, -1.4, outline_distance(&EAR, Vec2::new(c.z, c.y))) * smoothstep(62.0, 69.0, c.x)
 }
 
 impl Regions {
@@ -147,12 +222,17 @@ impl Regions {
             * smoothstep(81.0, 76.0, c.z + 0.011 * (c.x - 8.0).max(0.0).powi(2));
         let lips = (front * smoothstep(-0.7, 0.6, lip_depth)).max(behind_lips);
         let lip_border = front * (1.0 - smoothstep(0.0, 1.6, lip_depth.abs())) * (1.0 - behind_lips);
-        // The opening of the nostril, seen from below, and what lies behind it.
-        let nostril = blob(c, [7.5, -43.2, 91.0], [2.0, 1.6, 4.6]);
+        let nostril = smoothstep(0.3, 0.75, blob(c, [9.0, -41.6, 93.0], [5.0, 4.2, 6.6]));
+        // Behind the tragus.
+        let canal = Vec2::new((c.z + 12.0) / 4.4, (c.y + 29.0) / 4.6).length();
+        let ear_canal = smoothstep(1.25, 0.5, canal)
+            * smoothstep(-7.4, -9.4, c.z)
+            * smoothstep(66.0, 69.0, c.x)
+            * smoothstep(84.0, 80.0, c.x);
+        let caruncle = smoothstep(0.2, 0.8, blob(c, [18.6, -5.0, 71.0], [1.3, 1.2, 3.0]));
         let behind_lids = near_eye * smoothstep(-0.2, -1.2, eye);
 
-        let ear = blob(c, [90.0, -10.0, -27.0], [8.5, 26.0, 17.0]);
-        let ear = smoothstep(0.15, 0.5, ear);
+        let ear = ear_weight(c);
         let scalp = smoothstep(-1.5, 5.0, above_hairline(p)) * (1.0 - ear);
         let forehead = front * smoothstep(24.0, 36.0, c.y) * smoothstep(74.0, 58.0, s) * (1.0 - 0.5 * scalp);
         let jaw_line = -86.0 + 0.35 * (s - 30.0).max(0.0);
@@ -160,7 +240,7 @@ impl Regions {
         Self {
             lips,
             lip_border,
-            inner: behind_lips.max(nostril).max(behind_lids),
+            inner: behind_lips.max(behind_lids).max(0.85 * caruncle),
             lids,
             lid_edge,
             under_eye: near_eye * blob(c, [29.0, -13.0, 74.0], [10.0, 5.0, 14.0]),
@@ -179,13 +259,22 @@ impl Regions {
             beard: front.max(smoothstep(-10.0, 20.0, c.z))
                 * smoothstep(-40.0, -56.0, c.y + 0.55 * (40.0 - s).clamp(-50.0, 26.0))
                 * (1.0 - lips)
-                * smoothstep(-150.0, -128.0, c.y),
+                * smoothstep(-150.0, -128.0, c.y)
+                * (1.0 - ear),
             jaw: blob(c, [48.0, -88.0, 45.0], [24.0, 14.0, 35.0]),
             neck,
             ear,
             ear_rim: ear * smoothstep(84.0, 89.0, c.x),
+            nostril,
+            ear_canal,
             scalp,
         }
+    }
+
+    /// How much a point lies in an opening that light does not leave again: `open` is its ambient visibility, which tells
+    /// the inside of a nostril from the wing beside it.
+    pub(crate) fn hollow(&self, open: f32) -> f32 {
+        self.ear_canal.max(self.nostril * smoothstep(0.66, 0.40, open))
     }
 }
 
@@ -209,6 +298,37 @@ mod tests {
         for name in ["cheek", "glabella", "pronasale"] {
             let r = at(name);
             assert!(r.lips + r.scalp + r.inner + r.neck + r.lids < 0.05, "{name}: {r:?}");
+        }
+    }
+
+    #[test]
+    fn outlines_have_signed_distances() {
+        let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+        let at = |x, y| outline_distance(&square, Vec2::new(x, y));
+        assert!((at(2.0, 1.0) + 1.0).abs() < 1e-6 && (at(2.0, 5.5) - 1.5).abs() < 1e-6);
+        assert!((at(7.0, 8.0) - 5.0).abs() < 1e-6);
+        // The shortcuts far from the hairline agree with it, and nothing jumps where they begin.
+        for i in 0..200 {
+            for j in 0..60 {
+                let p = Vec2::new(i as f32 * 1.25, 110.0 - 4.0 * j as f32);
+                let exact = -outline_distance(&HAIRLINE, p).clamp(-25.0, 25.0);
+                let found = above_hairline(p);
+                assert_eq!(exact > 0.0, found > 0.0, "{p}");
+                assert!(found == exact || found.abs() >= 25.0 && exact.abs() > 16.0, "{p}: {found}, {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn hollows_are_where_light_does_not_return() {
+        let at = |x, y, z, open| Regions::at(Vec3::new(x, y, z)).hollow(open);
+        assert!(at(73.0, -29.0, -12.0, 0.4) > 0.9, "ear canal");
+        assert!(at(76.0, -29.0, -5.0, 0.9) < 0.01, "outer side of the tragus");
+        assert!(at(88.0, -20.0, -30.0, 0.7) < 0.01, "helix");
+        assert!(at(9.0, -42.0, 93.0, 0.25) > 0.9 && at(-9.0, -42.0, 93.0, 0.25) > 0.9, "nostrils");
+        assert!(at(9.0, -42.0, 93.0, 1.0) < 0.01, "what is seen from everywhere is no hole");
+        for name in ["pronasale", "alare", "subnasale", "cheek", "ear"] {
+            assert!(Regions::at(canonical(name)).hollow(0.5) < 0.35, "{name}");
         }
     }
 

@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 
 use super::face_space::{plan, plan_gradient};
 use super::noise::{features, gradient_noise, noise, smoothstep, unit};
-use super::regions::Regions;
+use super::regions::{Regions, lid_fold};
 use super::surface::Site;
 
 /// Mesh of the furrow net, mm.
@@ -109,22 +109,30 @@ impl Relief {
         let p = plan(c);
         let dry = (1.0 - r.lips.max(r.inner)).max(0.0);
         // The skin of the ear is drawn tight over cartilage, and the warp is loose there.
-        let skin = dry * (1.0 - 0.75 * r.lids) * (1.0 - 0.7 * r.ear);
+        let hollow = r.hollow(site.open);
+        let skin = dry * (1.0 - 0.75 * r.lids) * (1.0 - 0.9 * r.ear) * (1.0 - 0.8 * hollow);
         let tension = tension(p, r);
         let mut gradient = Vec3::ZERO;
         let mut cavity = 0.0;
 
-        // Unevenness between pores and features.
-        for (wavelength, height_mm, seed) in [(8.0, 0.032, 1u32), (2.7, 0.009, 2)] {
+        // Unevenness between pores and features; skin over bone and cartilage is even.
+        let tight =
+            (1.0 - 0.5 * r.forehead) * (1.0 - 0.6 * r.temple) * (1.0 - 0.85 * r.ear) * (1.0 - 0.6 * r.scalp);
+        for (wavelength, height_mm, seed) in [(8.0, 0.030, 1u32), (2.7, 0.009, 2)] {
             let g = gradient_noise(c / wavelength, self.seed ^ seed).1;
-            gradient += g * (height_mm * self.coarseness * dry / wavelength);
+            gradient += g * (height_mm * self.coarseness * dry * tight / wavelength);
         }
 
         if skin > 0.01 {
             let patch = (1.0 + 0.25 * noise(c, 6.0, self.seed ^ 3)).clamp(0.3, 1.7);
             let (g, depth) = self.furrows(site, tension);
-            let depth_mm =
-                0.026 * (1.0 - 0.45 * r.forehead - 0.3 * r.nose + 0.4 * r.lower_cheek + 0.3 * r.neck);
+            // Thin and smooth towards the side of the head and down the neck.
+            let side = smoothstep(58.0, 92.0, p.x.abs());
+            let depth_mm = 0.026
+                * (1.0 - 0.45 * r.forehead - 0.3 * r.nose + 0.2 * r.lower_cheek - 0.25 * r.jaw).max(0.3)
+                * (1.0 - 0.5 * r.neck)
+                * (1.0 - 0.35 * side)
+                * (1.0 - 0.4 * r.temple);
             let strength = skin * patch * self.coarseness;
             gradient += g * (strength * depth_mm);
             cavity += 0.45 * depth * strength;
@@ -151,6 +159,9 @@ impl Relief {
             }
         }
 
+        if r.lids > 0.01 {
+            gradient += self.lid_crease(c) * (r.lids * (1.0 - r.lid_edge));
+        }
         if r.lips > 0.01 {
             let wave = 0.7 * noise(c, 5.0, self.seed ^ 11);
             let at = c + Vec3::new(wave, 0.0, 0.0);
@@ -163,14 +174,14 @@ impl Relief {
         }
         let fine = [
             // Lids: two crossing sets of fine lines.
-            (r.lids, 34.0, 2.6, 0.75, 0.016, 21u32),
-            (r.lids, -30.0, 2.6, 0.75, 0.016, 22),
+            (r.lids, 34.0, 2.6, 0.75, 0.011, 21u32),
+            (r.lids, -30.0, 2.6, 0.75, 0.011, 22),
             (r.under_eye, -16.0, 5.0, 1.3, 0.016, 23),
             (r.forehead * (1.0 - r.scalp), 2.0, 12.0, 2.2, 0.012, 24),
             // Neck: rings and a crossing net.
-            (r.neck, 0.0, 70.0, 15.0, 0.12, 25),
-            (r.neck, 24.0, 7.0, 2.0, 0.014, 26),
-            (r.neck, -24.0, 7.0, 2.0, 0.014, 27),
+            (r.neck, 0.0, 70.0, 15.0, 0.10, 25),
+            (r.neck, 24.0, 7.0, 2.0, 0.007, 26),
+            (r.neck, -24.0, 7.0, 2.0, 0.007, 27),
         ];
         for (weight, degrees, along, across, height_mm, seed) in fine {
             let strength = weight * dry * self.held(0.6 * across);
@@ -183,12 +194,31 @@ impl Relief {
         ReliefSample { gradient, cavity: cavity.min(1.0) }
     }
 
+    /// Fold of the upper lid: gradient of its height.
+    fn lid_crease(&self, c: Vec3) -> Vec3 {
+        const DEPTH_MM: f32 = 0.22;
+        const WIDTH_MM: f32 = 0.85;
+        const STEP_MM: f32 = 0.2;
+        let height = |p: Vec2| {
+            let (above, mean) = lid_fold(p);
+            -DEPTH_MM * mean * (-(above / WIDTH_MM).powi(2)).exp()
+        };
+        let p = plan(c);
+        if lid_fold(p).0.abs() > 3.0 * WIDTH_MM {
+            return Vec3::ZERO;
+        }
+        let along = |d: Vec2| (height(p + d) - height(p - d)) / (2.0 * STEP_MM);
+        plan_gradient(c, Vec2::new(along(Vec2::X * STEP_MM), along(Vec2::Y * STEP_MM))) * self.coarseness
+    }
+
     /// Polygonal net: gradient per mm of depth, and nearness of a furrow.
     fn furrows(&self, site: &Site, tension: Vec2) -> (Vec3, f32) {
-        // A coarse map gets a wider, shallower net: grooves of under two texels would alias into grain.
-        let mesh_mm = MESH_MM.max(2.2 * self.finest_mm);
+        // Grooves of under two texels would alias into grain. A coarse map gets a wider net, much shallower, or it would
+        // look like scales; the renderer has a finer one of its own.
+        let mesh_mm = MESH_MM.max(1.8 * self.finest_mm);
+        let share = (MESH_MM / mesh_mm).powi(2);
         let width = (0.95 * self.finest_mm / mesh_mm).clamp(0.24, 0.45);
-        let metric = Metric::new(site.place, tension, 1.9);
+        let metric = Metric::new(site.place, tension, 1.6);
         let (mut first, mut second) = (f32::MAX, f32::MAX);
         let (mut at_first, mut at_second) = (Vec3::ZERO, Vec3::ZERO);
         features(site.place / mesh_mm, self.seed ^ 0xf0, |_, d| {
@@ -204,8 +234,8 @@ impl Relief {
         let (f1, f2) = (first.sqrt().max(1e-4), second.sqrt().max(1e-4));
         let gap = (f2 - f1) / width;
         let groove = (-gap * gap).exp();
-        let slope = 2.0 * gap / width * groove / mesh_mm * (MESH_MM / mesh_mm).sqrt();
-        ((at_second / f2 - at_first / f1) * slope, groove * MESH_MM / mesh_mm)
+        let slope = 2.0 * gap / width * groove / mesh_mm * share;
+        ((at_second / f2 - at_first / f1) * slope, groove * share)
     }
 
     /// Round pits in the plane of the surface: gradient per mm of depth, and nearness of a pit's bottom.
@@ -220,7 +250,9 @@ impl Relief {
     ) -> (Vec3, f32) {
         let (mut gradient, mut depth) = (Vec3::ZERO, 0.0f32);
         // A map too coarse for a pore shows a wider and shallower one.
-        let radius_mm = radius_mm.max(0.7 * self.finest_mm);
+        let true_radius_mm = radius_mm;
+        let radius_mm = radius_mm.max(0.62 * self.finest_mm);
+        let shallow = (true_radius_mm / radius_mm).sqrt();
         let spacing_mm = spacing_mm.max(3.0 * radius_mm);
         features(site.place / spacing_mm, self.seed ^ (0xb0 + layer), |h, d| {
             let there = smoothstep(0.0, 0.12, share - unit(h));
@@ -233,7 +265,7 @@ impl Relief {
                 let size = radius_mm * (0.75 + 0.55 * unit(h.wrapping_mul(0x2545_f491))) / spacing_mm;
                 let t = 1.0 - d.dot(m) / (size * size);
                 if t > 0.0 {
-                    let strength = reach * (0.5 + 0.8 * unit(h.wrapping_mul(0x85eb_ca6b)));
+                    let strength = shallow * reach * (0.5 + 0.8 * unit(h.wrapping_mul(0x85eb_ca6b)));
                     gradient += m * (strength * 4.0 * t / (size * size * spacing_mm));
                     depth += strength * t * t;
                 }

@@ -8,7 +8,8 @@
 
 use glam::Vec3;
 
-use super::noise::noise;
+use super::face_space::plan;
+use super::noise::{noise, smoothstep};
 use super::regions::Regions;
 
 /// Specular intensity rho_s and roughness m where no region speaks.
@@ -16,9 +17,13 @@ const SKIN: [f32; 2] = [0.34, 0.285];
 
 /// Intensity factor and Beckmann roughness of a point.
 pub(crate) fn specular(place: Vec3, r: &Regions, cavity: f32, hair: f32, seed: u32) -> [f32; 2] {
-    // Offsets from SKIN of the ten regions.
+    // The T-zone is the middle of the forehead only.
+    let centre = smoothstep(58.0, 30.0, plan(place).x.abs());
+    // Offsets from SKIN of the regions.
     let regions = [
-        (r.forehead, 0.085, -0.032),
+        (r.forehead * centre, 0.085, -0.032),
+        (r.forehead * (1.0 - centre), -0.08, 0.030),
+        (r.temple, -0.09, 0.030),
         (r.glabella, 0.070, -0.028),
         (r.lids, 0.060, -0.035),
         (r.nose, 0.160, -0.055),
@@ -36,8 +41,9 @@ pub(crate) fn specular(place: Vec3, r: &Regions, cavity: f32, hair: f32, seed: u
     }
     // Oil lies in patches.
     let oil = noise(place, 11.0, seed ^ 0x01) + 0.6 * noise(place, 3.5, seed ^ 0x02);
-    intensity *= 1.0 + 0.10 * oil;
-    roughness *= 1.0 - 0.045 * oil;
+    let oily = 0.35 + 0.65 * (r.forehead * centre).max(r.nose).max(r.nose_tip).max(r.chin);
+    intensity *= 1.0 + 0.10 * oily * oil;
+    roughness *= 1.0 - 0.045 * oily * oil;
     // Lips, linings and lid edges are wet.
     let wet = [(r.lips, 0.62, 0.205), (r.inner, 0.62, 0.24), (r.lid_edge * 0.7, 0.7, 0.19)];
     for (weight, i, m) in wet {
@@ -45,7 +51,7 @@ pub(crate) fn specular(place: Vec3, r: &Regions, cavity: f32, hair: f32, seed: u
         roughness += weight * (m - roughness);
     }
     // Pores and furrows hold light back; hair scatters it.
-    intensity *= (1.0 - 0.45 * cavity) * (1.0 - 0.75 * hair);
+    intensity *= (1.0 - 0.45 * cavity) * (1.0 - 0.88 * hair);
     roughness += 0.03 * hair;
     [intensity.clamp(0.05, 0.8), roughness.clamp(0.17, 0.36)]
 }

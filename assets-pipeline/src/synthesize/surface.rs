@@ -29,6 +29,8 @@ struct Corner {
     /// Canonical displacement per mm along the tangent and the bitangent of the texture frame.
     along_tangent: Vec3,
     along_bitangent: Vec3,
+    /// Ambient visibility at rest, 0 to 1.
+    open: f32,
 }
 
 /// Skin triangles of a head in canonical space.
@@ -47,6 +49,8 @@ pub(crate) struct Site {
     pub normal: Vec3,
     /// Texture coordinate.
     pub uv: Vec2,
+    /// Ambient visibility at rest, 0 to 1; 1 where the head does not say.
+    pub open: f32,
     along_tangent: Vec3,
     along_bitangent: Vec3,
 }
@@ -80,6 +84,7 @@ impl SkinSurface {
                 place: space.warp(p),
                 along_tangent: derivative(tangent),
                 along_bitangent: derivative(bitangent),
+                open: mesh.occlusion.get(vertex.point as usize).copied().unwrap_or(1.0),
             }
         };
         let mut used = vec![None; mesh.vertices.len()];
@@ -294,6 +299,7 @@ fn site_at(t: &[Corner; 3], p: Vec2) -> Site {
         place: blend(|c| c.place),
         normal: normal.normalize_or_zero(),
         uv: p,
+        open: t[0].open * (1.0 - w1 - w2) + t[1].open * w1 + t[2].open * w2,
         along_tangent,
         along_bitangent,
     }

@@ -364,3 +364,63 @@ fn wrong_options_and_heads_are_refused() {
     let error = synthesize(&Head { name: "bald".into(), ..Head::default() }, &options(256)).unwrap_err();
     assert!(matches!(&error, SynthesizeError::NoSkin { head } if head == "bald"), "{error}");
 }
+
+#[test]
+fn relief_and_shine_are_calm_beside_the_t_zone() {
+    // Root mean square of slopes in a box of places, as a map of 4096 texels holds them.
+    let head = head();
+    let surface = SkinSurface::new(&head, &FaceSpace::fit(&head));
+    let site = surface.rasterise(256).site(190, 128).unwrap();
+    let relief = Relief::new(1, 0.19, 30.0);
+    let rms = |middle: Vec3| {
+        let mut sum = 0.0;
+        for i in 0..600 {
+            let f = |k: i32| ((i * k) % 601) as f32 / 60.1 - 5.0;
+            let place = middle + Vec3::new(0.0, f(37), f(211));
+            let r = Regions::at(place);
+            let mut here = site;
+            (here.place, here.normal) = (place, Vec3::X);
+            sum += relief.sample(&here, &r).gradient.length_squared();
+        }
+        (sum / 600.0).sqrt()
+    };
+    let (cheek, ear) = (rms(Vec3::new(60.0, -40.0, 50.0)), rms(Vec3::new(88.0, -22.0, -24.0)));
+    let neck = rms(Vec3::new(50.0, -130.0, 10.0));
+    assert!(ear < 0.3 * cheek, "ear {ear}, cheek {cheek}");
+    assert!(neck < 0.8 * cheek, "neck {neck}, cheek {cheek}");
+    let shine = |c: Vec3| specular::specular(c, &Regions::at(c), 0.0, 0.0, 1);
+    let (middle, temple) = (shine(Vec3::new(0.0, 50.0, 86.0)), shine(Vec3::new(66.0, 24.0, 40.0)));
+    assert!(temple[0] < 0.75 * middle[0] && temple[1] > middle[1] + 0.04, "{temple:?} {middle:?}");
+}
+
+#[test]
+fn the_ears_of_every_character_are_bald() {
+    let Ok(data) = std::env::var("RUBOR_MAKEHUMAN") else {
+        eprintln!("SKIPPED: RUBOR_MAKEHUMAN is not set, no character was built");
+        return;
+    };
+    for character in &crate::import::makehuman::CHARACTERS {
+        let mut geometry = character.head();
+        (geometry.data, geometry.subdivide, geometry.occlusion_rays) = (data.clone().into(), 0, 0);
+        let head = crate::import::makehuman::import(&geometry).unwrap();
+        let space = FaceSpace::fit(&head);
+        let hairs = Hairs::new(&Options { scalp_hair: 1.0, stubble: 0.0, ..options(512) }, 0.7);
+        let skin = head.mesh.parts.iter().find(|p| p.material == Material::Skin).unwrap();
+        let (mut ear, mut scalp) = (0, 0);
+        for v in
+            head.mesh.triangles[skin.triangles.start as usize..skin.triangles.end as usize].iter().flatten()
+        {
+            let c = space.warp(head.mesh.points[head.mesh.vertices[*v as usize].point as usize]);
+            let cover = hairs.cover(c, &Regions::at(c));
+            // What stands out from the head at the height of the ears is ear; what lies 5 to 20 mm above is scalp.
+            if c.x.abs() > 84.0 && c.y < 2.0 && c.y > -54.0 {
+                ear += 1;
+                assert!(cover < 0.1, "{}: {cover} of the ear is covered at {c}", character.name);
+            } else if (8.0..22.0).contains(&c.y) && (-50.0..-8.0).contains(&c.z) {
+                scalp += 1;
+                assert!(cover > 0.5, "{}: {cover} of the scalp is covered at {c}", character.name);
+            }
+        }
+        assert!(ear > 200 && scalp > 20, "{}: {ear} corners of the ears, {scalp} above them", character.name);
+    }
+}

@@ -149,7 +149,7 @@ impl Wrinkles {
                 height -= (0.25 + 0.35 * unit(hash(h as i32, 1, 1, 5))) * t * t;
             }
         });
-        area * (0.7 * height + 0.12 * noise(p.extend(9.0), 7.0, self.seed ^ 0xc42))
+        area * (0.6 * height + 0.12 * noise(p.extend(9.0), 7.0, self.seed ^ 0xc42))
     }
 }
 
@@ -325,7 +325,7 @@ fn nasolabial(pen: &mut Pen, side: f32) {
         fold.taper = [0.30, 0.62];
     }
     // A crease of the skin itself at the bottom of its upper half.
-    pen.draw(&knots[..4], 0.30, 1.1, [0.1; 2]);
+    pen.draw(&knots[..4], 0.20, 1.3, [0.0; 2]);
 }
 
 /// The groove between lower lip and chin.
