@@ -31,6 +31,9 @@ pub struct FacialAppearance {
     /// Accessor: ambient visibility of each point, SCALAR, unsigned short normalized.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub occlusion: Option<u32>,
+    /// How blend shapes change it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shape_occlusion: Vec<ShapeOcclusionEntry>,
     /// Anatomical points, metres.
     #[serde(default)]
     pub landmarks: BTreeMap<String, [f32; 3]>,
@@ -58,6 +61,18 @@ pub struct PartEntry {
     pub material: Material,
     /// Accessor: point of each vertex of the primitive, SCALAR, unsigned short or int.
     pub points: u32,
+}
+
+/// How a blend shape changes ambient visibility.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct ShapeOcclusionEntry {
+    /// One of the mesh's `targetNames`.
+    pub shape: String,
+    /// Accessor: points whose visibility changes, SCALAR, unsigned short or int, strictly increasing.
+    pub points: u32,
+    /// Accessor: change at weights 0.5 and 1 of each of them, VEC2, byte normalized.
+    pub changes: u32,
 }
 
 /// All maps; those that the head does not have are absent.

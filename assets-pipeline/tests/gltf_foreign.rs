@@ -454,6 +454,7 @@ fn the_published_schema_names_the_properties() {
     let provenance = json!({"of": "geometry", "kind": "measured", "source": "s", "licence": "MIT"});
     let whole = json!({
         "version": 1, "name": "n", "mesh": 0, "pointCount": 3, "parts": [part], "occlusion": 2,
+        "shapeOcclusion": [{"shape": "jawOpen", "points": 3, "changes": 4}],
         "landmarks": {"a": [0.0, 0.0, 0.0]}, "maps": maps, "provenance": [provenance], "rig": {}, "sequence": {},
     });
     let written = |v: Value| -> Value {
@@ -465,6 +466,7 @@ fn the_published_schema_names_the_properties() {
     assert_eq!(keys(&back), keys(at("/properties")));
     assert_eq!(keys(&back["maps"]), keys(at("/properties/maps/properties")));
     assert_eq!(keys(&back["parts"][0]), keys(at("/properties/parts/items/properties")));
+    assert_eq!(keys(&back["shapeOcclusion"][0]), keys(at("/properties/shapeOcclusion/items/properties")));
     assert_eq!(
         keys(&back["maps"]["zones"][0]),
         keys(at("/properties/maps/properties/zones/items/properties"))

@@ -10,7 +10,8 @@ use rubor_assets::export::{TextureFormat, top_shapes};
 use rubor_assets::import::gltf::from_bytes;
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{
-    BlendShape, Distribution, Head, Material, Mesh, Part, Provenance, ProvenanceKind, Vertex, WrinkleZone,
+    BlendShape, Distribution, Head, Material, Mesh, OcclusionChange, Part, Provenance, ProvenanceKind,
+    Vertex, WrinkleZone,
 };
 use rubor_rig::map::Map;
 use rubor_rig::timeline::Sequence;
@@ -51,16 +52,25 @@ fn head() -> Head {
     ];
     mesh.occlusion = (0..mesh.points.len()).map(|i| (i % 7) as f32 / 6.0).collect();
     let all: Vec<u32> = (0..first).collect();
+    // Whole steps of the file.
+    let change = |point, half: i8, full: i8| OcclusionChange {
+        point,
+        at_half: f32::from(half) / 127.0,
+        at_full: f32::from(full) / 127.0,
+    };
+    let changes = vec![change(1, -30, -31), change(3, 0, 127), change(200, 4, -127)];
     let shapes = vec![
         BlendShape {
             name: "few".into(),
             points: vec![3, 17, 200],
             offsets: vec![Vec3::new(0.1, -0.2, 1e-7); 3],
+            occlusion: changes,
         },
         BlendShape {
             name: "all".into(),
             offsets: all.iter().map(|i| Vec3::splat(1e-4 * (*i as f32 + 1.0))).collect(),
             points: all,
+            occlusion: Vec::new(),
         },
         BlendShape { name: "none".into(), ..BlendShape::default() },
     ];

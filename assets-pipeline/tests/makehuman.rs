@@ -2,7 +2,9 @@
 
 use std::collections::HashMap;
 
+use rubor_assets::convert::occlusion;
 use rubor_assets::import::makehuman::{Options, import};
+use rubor_rig::deform::{blend_occlusion, deform_points};
 use rubor_rig::head::{Head, Material};
 use rubor_rig::landmarks::{MIDDLE, PAIRED, paired};
 
@@ -84,5 +86,47 @@ fn missing_data_and_wrong_options_are_errors() {
         Options { subdivide: 3, ..Options::default() },
     ] {
         assert!(import(&options).unwrap_err().to_string().contains("option"));
+    }
+}
+
+/// The error of blended visibility against rays in the posed head, and that of visibility that stays as at rest.
+#[test]
+fn ambient_visibility_follows_jaw_and_lids() {
+    let Ok(data) = std::env::var("RUBOR_MAKEHUMAN") else {
+        eprintln!("SKIPPED: RUBOR_MAKEHUMAN is not set, the default head was not built");
+        return;
+    };
+    let options = Options { data: data.into(), subdivide: 0, occlusion_rays: 0, ..Options::default() };
+    let mut head = import(&options).unwrap();
+    occlusion::bake(&mut head, 32);
+    let rest = head.mesh.occlusion.clone();
+    let blinks = ["eyeBlinkLeft", "eyeBlinkRight"];
+    occlusion::bake_shapes(&mut head, 32, &[("jawOpen", None), (blinks[0], None), (blinks[1], None)]);
+    assert_eq!(head.mesh.occlusion, rest);
+    // The renderer finds the lids over eyes in the picture.
+    let mut is_eye = vec![false; rest.len()];
+    for part in head.mesh.parts.iter().filter(|p| p.material == Material::Eye) {
+        let triangles = &head.mesh.triangles[part.triangles.start as usize..part.triangles.end as usize];
+        let points = triangles.as_flattened().iter().map(|v| head.mesh.vertices[*v as usize].point);
+        points.for_each(|p| is_eye[p as usize] = true);
+    }
+    let rms = |a: &[f32], b: &[f32]| {
+        let squares =
+            a.iter().zip(b).zip(&is_eye).filter(|(_, eye)| !**eye).map(|((x, y), _)| (x - y).powi(2));
+        let squares: Vec<f32> = squares.collect();
+        (squares.iter().sum::<f32>() / squares.len() as f32).sqrt()
+    };
+    // Weights of jaw and blinks. The same rays, so no noise: what is left are small changes and what is between weights.
+    for (jaw, blink) in [(0.0, 0.0), (1.0, 0.0), (0.75, 0.0), (0.5, 1.0)] {
+        let mut weights = vec![0.0; head.shapes.len()];
+        weights[head.shape_index("jawOpen").unwrap()] = jaw;
+        blinks.iter().for_each(|b| weights[head.shape_index(b).unwrap()] = blink);
+        let mut posed = head.clone();
+        posed.mesh.points = deform_points(&head.mesh, &head.shapes, &weights);
+        occlusion::bake(&mut posed, 32);
+        let blended = blend_occlusion(&head.mesh, &head.shapes, &weights);
+        let (error, still) = (rms(&blended, &posed.mesh.occlusion), rms(&rest, &posed.mesh.occlusion));
+        println!("jaw {jaw}, lids {blink}: {error:.4}, as at rest {still:.4}");
+        assert!(error < 0.01 && error <= 0.5 * still, "jaw {jaw}, lids {blink}: {error} of {still}");
     }
 }

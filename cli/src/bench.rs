@@ -6,7 +6,9 @@
 
 use std::path::PathBuf;
 
-use rubor_renderer::{FrameTimes, Gpu, Renderer, ScatterMethod, TransmitMethod, list_adapters};
+use rubor_renderer::{
+    FrameTimes, Gpu, Renderer, ScatterMethod, SpecularMethod, TransmitMethod, list_adapters,
+};
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::timeline::{Camera, Framing};
 use serde::Serialize;
@@ -37,6 +39,9 @@ pub(crate) struct Arguments {
     /// Methods for light through thin parts
     #[arg(long, value_delimiter = ',', default_value = "shadow-depth", value_name = "METHODS")]
     transmit: Vec<TransmitMethod>,
+    /// Highlights of skin: one-lobe or two-lobes
+    #[arg(long, default_value = "one-lobe", value_name = "METHOD")]
+    specular: SpecularMethod,
     /// Antialiasing methods
     #[arg(long, value_delimiter = ',', value_parser = parse_antialias, default_value = "smaa-s2x", value_name = "METHODS")]
     antialias: Vec<Antialias>,
@@ -105,8 +110,9 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     for &scatter in &arguments.scatter {
         for &transmit in &arguments.transmit {
             for &antialias in &arguments.antialias {
-                let settings =
+                let mut settings =
                     studio::settings(arguments.size, scatter, transmit, antialias, arguments.exposure);
+                settings.appearance.specular = arguments.specular;
                 let times = studio.measure(&shot, &settings, arguments.warm_up, arguments.frames)?;
                 let cost = Cost {
                     scatter: scatter.to_string(),

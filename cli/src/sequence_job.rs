@@ -13,7 +13,8 @@ use std::time::Instant;
 use image::RgbImage;
 use rubor_assets::export;
 use rubor_renderer::{
-    AppearanceMethods, ColorMethod, Gpu, Image, Renderer, ScatterMethod, TransmitMethod, WrinkleMethod,
+    AppearanceMethods, ColorMethod, Gpu, Image, Renderer, ScatterMethod, SpecularMethod, TransmitMethod,
+    WrinkleMethod,
 };
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
@@ -55,6 +56,9 @@ pub(crate) struct Arguments {
     /// Wrinkles: none, partial-derivative (slopes add) or difference (differences of normals add)
     #[arg(long, default_value = "partial-derivative", value_name = "METHOD")]
     pub(crate) wrinkles: WrinkleMethod,
+    /// Highlights of skin: one-lobe (of the map's roughness) or two-lobes (a sharp and a broad one in its place)
+    #[arg(long, default_value = "one-lobe", value_name = "METHOD")]
+    pub(crate) specular: SpecularMethod,
     /// Draw a map of the moment of the (first) head into a corner: hemoglobin (dark is more) or wrinkles
     #[arg(long, value_enum, value_name = "MAP")]
     pub(crate) inset: Option<inset::Map>,
@@ -133,7 +137,11 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         arguments.antialias,
         arguments.exposure,
     );
-    settings.appearance = AppearanceMethods { color: arguments.color, wrinkles: arguments.wrinkles };
+    settings.appearance = AppearanceMethods {
+        color: arguments.color,
+        wrinkles: arguments.wrinkles,
+        specular: arguments.specular,
+    };
     let mut evaluators = Vec::new();
     for loaded in &job.heads {
         let (evaluator, notes) = Evaluator::new(&loaded.head, &job.rig, &job.sequence)?;
@@ -213,6 +221,7 @@ pub(crate) fn run(mut job: Job, arguments: &Arguments) -> Outcome {
         "transmit": arguments.transmit.to_string(),
         "color": arguments.color.to_string(),
         "wrinkles": arguments.wrinkles.to_string(),
+        "specular": arguments.specular.to_string(),
         "antialias": arguments.antialias.to_string(),
         "secondsToFirstFrame": first_frame_s,
         "secondsPerFrame": median(&mut drawn),
@@ -253,6 +262,7 @@ fn claim_folder(job: &Job, size: [u32; 2], arguments: &Arguments) -> Outcome<boo
         "transmit": arguments.transmit.to_string(),
         "color": arguments.color.to_string(),
         "wrinkles": arguments.wrinkles.to_string(),
+        "specular": arguments.specular.to_string(),
         "inset": arguments.inset.map(|i| format!("{i:?}")),
         "antialias": arguments.antialias.to_string(),
         "exposure": arguments.exposure,

@@ -114,6 +114,7 @@ fn head() -> Head {
         name: "mouthPucker".into(),
         points: (0..N * N).collect(),
         offsets: mesh.points.iter().map(|p| Vec3::new(-0.2 * p.x, 0.0, 0.0)).collect(),
+        ..BlendShape::default()
     };
     let maps = SkinMaps {
         melanin: Some(flat(64, 0.03)),

@@ -38,6 +38,9 @@ pub(crate) struct Appearance {
     pub(crate) provenance: Vec<Provenance>,
     #[serde(default)]
     pub(crate) occlusion: Vec<f32>,
+    /// Of shapes that change it: name; point, change at weights 0.5 and 1.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub(crate) shape_occlusion: BTreeMap<String, Vec<(u32, f32, f32)>>,
     #[serde(default)]
     pub(crate) maps: Vec<MapEntry>,
     #[serde(default)]
@@ -83,6 +86,11 @@ impl Appearance {
             landmarks: head.landmarks.clone(),
             provenance: head.provenance.clone(),
             occlusion: head.mesh.occlusion.clone(),
+            shape_occlusion: (head.shapes.iter().filter(|s| !s.occlusion.is_empty()))
+                .map(|s| {
+                    (s.name.clone(), s.occlusion.iter().map(|c| (c.point, c.at_half, c.at_full)).collect())
+                })
+                .collect(),
             maps: Vec::new(),
             hair_color_linear: head.maps.hair_color_linear,
             rig: None,

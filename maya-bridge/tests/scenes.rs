@@ -7,8 +7,8 @@ use rubor_maya::read::{self, Imported};
 use rubor_maya::write::{self, Performance};
 use rubor_rig::expression::{Inbetween, Rig};
 use rubor_rig::head::{
-    BlendShape, Distribution, Head, Material, Mesh, Part, Provenance, ProvenanceKind, SkinMaps, Vertex,
-    WrinkleZone,
+    BlendShape, Distribution, Head, Material, Mesh, OcclusionChange, Part, Provenance, ProvenanceKind,
+    SkinMaps, Vertex, WrinkleZone,
 };
 use rubor_rig::map::Map;
 use rubor_rig::timeline::{Ease, Key, Sequence, Track};
@@ -76,13 +76,18 @@ fn head() -> Head {
             .step_by(step)
             .map(|_| 0.01 * Vec3::new(noise.signed(), noise.signed(), 1e-6 * noise.signed()))
             .collect(),
+        ..BlendShape::default()
     };
-    let shapes = vec![
+    let mut shapes = vec![
         shape("jawOpen", 1),
         shape("eyeBlink_L", 3),
         shape("mouth smile-left", 5),
         shape("jawOpen_half", 2),
         BlendShape { name: "empty".into(), ..BlendShape::default() },
+    ];
+    shapes[0].occlusion = vec![
+        OcclusionChange { point: 2, at_half: 0.3, at_full: -0.5 },
+        OcclusionChange { point: 7, at_half: -0.1, at_full: 1.0 },
     ];
     let mut map = |side: u32, channels: u32| Map {
         width: side,

@@ -184,7 +184,7 @@ mod tests {
         let top: Vec<u32> =
             (0..mesh.points.len() as u32).filter(|p| mesh.points[*p as usize].y > 0.06).collect();
         let offsets = top.iter().map(|p| (mesh.points[*p as usize].y - 0.06) * Vec3::Y).collect();
-        let shapes = vec![BlendShape { name: "top".into(), points: top, offsets }];
+        let shapes = vec![BlendShape { name: "top".into(), points: top, offsets, ..BlendShape::default() }];
         Head { mesh, shapes, ..Head::default() }
     }
 

@@ -294,6 +294,7 @@ impl Renderer {
             let table = Transmittance::new(&self.gpu, &settings.profile)?;
             self.transmittance = Some((settings.profile.clone(), table));
         }
+        self.shade.prepare_specular(&self.gpu, settings.appearance.specular);
         if matches!(settings.scatter, ScatterMethod::ReferenceSurface(_)) {
             self.shade.prepare_samples(&self.gpu);
         }
@@ -310,6 +311,17 @@ impl Renderer {
         let bytes = self.gpu.read_buffer(&instance.positions)?;
         let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
         Ok(points.into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect())
+    }
+
+    /// Ambient visibility of each point of the first head of the last frame.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read_occlusion(&self) -> Result<Vec<f32>, RenderError> {
+        let Some(instance) = self.instances.first() else { return Ok(Vec::new()) };
+        let bytes = self.gpu.read_buffer(&instance.positions)?;
+        let points: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        Ok(points.into_iter().map(|p| p[3]).collect())
     }
 
     /// Linear radiance of the last frame (of its last sample), RGB and coverage, rows from the top.
@@ -349,8 +361,8 @@ impl Renderer {
         Ok(frames.into_iter().map(frame).collect())
     }
 
-    /// Linear Rec. 709 albedo of the skin of the last frame (of its last sample), 0 elsewhere; a = 1 on skin. Rows from
-    /// the top.
+    /// Linear Rec. 709 albedo of the skin of the last frame (of its last sample), less what the surface turns back at this
+    /// angle; 0 elsewhere; a = 1 on skin. Rows from the top.
     ///
     /// # Errors
     /// The device failed.
@@ -713,6 +725,7 @@ fn shaded<'a>(
             ColorMethod::Hemoglobin => instance.state.hemoglobin_scale,
         },
         wrinkles: appearance.wrinkles,
+        specular: appearance.specular,
         pupil_mm: instance.state.pupil_mm,
         world_from_head: world_from_head(instance),
     }

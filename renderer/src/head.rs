@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use rubor_rig::head::{Head, Material};
+use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange};
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, resize_area};
 use wgpu::util::DeviceExt;
@@ -20,6 +20,8 @@ pub const MAX_MELANIN: f32 = 0.5;
 pub const MAX_HEMOGLOBIN: f32 = 0.32;
 /// Wrinkle maps that one head can have: a weight each in the channels of four layers.
 pub const MAX_WRINKLE_MAPS: usize = 16;
+/// Blend shapes that one head can have.
+pub(crate) const MAX_SHAPES: usize = 1 << 12;
 /// Hemoglobin distributions that one head can have.
 pub const MAX_DISTRIBUTIONS: usize = 64;
 /// Wrinkle zones that one head can have.
@@ -109,6 +111,7 @@ impl HeadOnGpu {
             return Err(RenderError::Limit { what: "number of points", found, expected });
         };
         limit("number of triangles", mesh.triangles.len(), (1 << 27) - 2)?;
+        limit("number of blend shapes", head.shapes.len(), MAX_SHAPES)?;
         limit("number of wrinkle maps", head.maps.wrinkle_slopes.len(), MAX_WRINKLE_MAPS)?;
         limit("number of hemoglobin distributions", head.maps.distributions.len(), MAX_DISTRIBUTIONS)?;
         limit("number of wrinkle zones", head.maps.zones.len(), MAX_ZONES)?;
@@ -196,26 +199,47 @@ fn texture_bytes(view: &wgpu::TextureView) -> u64 {
 }
 
 /// Offsets sorted by point, shapes ascending within a point: starts (one more than points) and (offset, shape).
-fn gather_deltas(head: &Head) -> (Vec<u32>, Vec<[f32; 4]>) {
+///
+/// A word holds the shape in its lower 12 bits and, in 10 each above, the change of ambient visibility at weights 0.5 and
+/// 1 in steps of 1/511.
+fn gather_deltas(head: &Head) -> (Vec<u32>, Vec<[u32; 4]>) {
     let mut starts = vec![0u32; head.mesh.points.len() + 1];
-    for shape in &head.shapes {
-        for p in &shape.points {
-            starts[*p as usize + 1] += 1;
-        }
+    let merged: Vec<Vec<(u32, Vec3, u32)>> = head.shapes.iter().map(merged_changes).collect();
+    for (p, ..) in merged.iter().flatten() {
+        starts[*p as usize + 1] += 1;
     }
     for i in 1..starts.len() {
         starts[i] += starts[i - 1];
     }
     let mut next = starts.clone();
-    let mut deltas = vec![[0.0; 4]; starts[starts.len() - 1] as usize];
-    for (index, shape) in head.shapes.iter().enumerate() {
-        for (p, offset) in shape.points.iter().zip(&shape.offsets) {
-            let slot = &mut next[*p as usize];
-            deltas[*slot as usize] = offset.extend(f32::from_bits(index as u32)).to_array();
+    let mut deltas = vec![[0; 4]; starts[starts.len() - 1] as usize];
+    for (index, changes) in merged.into_iter().enumerate() {
+        for (p, offset, occlusion) in changes {
+            let slot = &mut next[p as usize];
+            let [x, y, z] = offset.to_array().map(f32::to_bits);
+            deltas[*slot as usize] = [x, y, z, index as u32 | occlusion];
             *slot += 1;
         }
     }
     (starts, deltas)
+}
+
+/// Points that a shape moves or hides: point, offset, and change of visibility in the upper bits.
+fn merged_changes(shape: &BlendShape) -> Vec<(u32, Vec3, u32)> {
+    let step = |v: f32| (v.clamp(-1.0, 1.0) * 511.0).round() as i32 as u32 & 0x3ff;
+    let packed = |c: &OcclusionChange| step(c.at_half) << 12 | step(c.at_full) << 22;
+    let mut moved = shape.points.iter().copied().zip(shape.offsets.iter().copied()).peekable();
+    let mut hidden = shape.occlusion.iter().map(|c| (c.point, packed(c))).peekable();
+    let mut merged = Vec::with_capacity(shape.points.len());
+    loop {
+        let point = match (moved.peek(), hidden.peek()) {
+            (Some((a, _)), Some((b, _))) => *a.min(b),
+            (Some((p, _)), None) | (None, Some((p, _))) => *p,
+            (None, None) => return merged,
+        };
+        let offset = moved.next_if(|m| m.0 == point).map_or(Vec3::ZERO, |m| m.1);
+        merged.push((point, offset, hidden.next_if(|h| h.0 == point).map_or(0, |h| h.1)));
+    }
 }
 
 /// Triangles with the number of their material: opaque ones first, then overlays; hidden ones are left out.

@@ -44,7 +44,7 @@ pub use head::{
 };
 pub use pass_timer::{FrameTimes, PassTimer};
 pub use passes::antialias;
-pub use passes::appearance::{AppearanceMethods, ColorMethod, WrinkleMethod};
+pub use passes::appearance::{AppearanceMethods, ColorMethod, SpecularMethod, WrinkleMethod};
 pub use passes::scatter::ScatterMethod;
 pub use passes::scatter::surface::BARE_SKIN;
 pub use passes::shade::TransmitMethod;

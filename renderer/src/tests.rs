@@ -5,7 +5,9 @@ use std::sync::Arc;
 use glam::{Mat4, Quat, Vec2, Vec3};
 use rubor_rig::deform;
 use rubor_rig::face_state::FaceState;
-use rubor_rig::head::{BlendShape, Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
+use rubor_rig::head::{
+    BlendShape, Distribution, Head, Material, Mesh, OcclusionChange, Part, SkinMaps, Vertex, WrinkleZone,
+};
 use rubor_rig::map::Map;
 use rubor_rig::skin::profile::Profile;
 
@@ -18,7 +20,7 @@ use crate::passes::{
 use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
 use crate::{
     AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light,
-    LightKind, RenderError, Renderer, ScatterMethod, Scene, Settings, TransmitMethod,
+    LightKind, RenderError, Renderer, ScatterMethod, Scene, Settings, SpecularMethod, TransmitMethod,
 };
 
 #[test]
@@ -86,7 +88,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             environment_intensity as "environment_intensity", environment_levels as "environment_levels",
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", hair_color as "hair_color",
             is_second_sample as "is_second_sample", transmit_per_mm as "transmit_per_mm",
-            adds_differences as "adds_differences", pupil_mm as "pupil_mm", ring_taps_mm as "ring_taps_mm",
+            adds_differences as "adds_differences", pupil_mm as "pupil_mm", lobes as "lobes", ring_taps_mm as "ring_taps_mm",
             ring_ends_mm as "ring_ends_mm", middle as "middle", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
@@ -136,7 +138,7 @@ pub(crate) fn dome() -> Head {
     let shape = |name: &str, every: usize, offset: fn(Vec3) -> Vec3| {
         let points: Vec<u32> = (0..mesh.points.len()).step_by(every).map(|p| p as u32).collect();
         let offsets = points.iter().map(|p| offset(mesh.points[*p as usize])).collect();
-        BlendShape { name: name.into(), points, offsets }
+        BlendShape { name: name.into(), points, offsets, ..BlendShape::default() }
     };
     let shapes = vec![
         shape("swell", 1, |p| 0.02 * p.normalize()),
@@ -234,6 +236,71 @@ fn the_morph_kernel_places_points_where_the_cpu_does() {
     assert_eq!(found.len(), expected.len());
     for (a, b) in found.iter().zip(expected) {
         assert!(a.distance(place.transform_point3(b)) < 1e-5 * head.height(), "{a} {b}");
+    }
+}
+
+#[test]
+fn ambient_visibility_follows_the_shapes_as_on_the_cpu() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    let count = head.mesh.points.len() as u32;
+    let noise = |i: u32| i.wrapping_mul(0x9e37_79b9) as f32 / 2f32.powi(32);
+    head.mesh.occlusion = (0..count).map(noise).collect();
+    // Also of points that the shape does not move.
+    head.shapes[1].occlusion = (0..count)
+        .step_by(2)
+        .map(|point| OcclusionChange {
+            point,
+            at_half: 2.0 * noise(point + 1000) - 1.0,
+            at_full: 1.0 - 2.0 * noise(point + 2000),
+        })
+        .collect();
+    head.shapes[0].occlusion = vec![OcclusionChange { point: count - 1, at_half: -1.0, at_full: 1.0 }];
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    for weights in [[0.0, 0.0], [0.0, 1.0], [0.5, 0.5], [0.7, 0.3], [-2.0, 3.0]] {
+        let mut state = FaceState::neutral(&head);
+        state.shapes = weights.to_vec();
+        draw(&mut renderer, &on_gpu, &state, &[], &settings([16, 16])).expect("it draws");
+        let found = renderer.read_occlusion().expect("visibility comes back");
+        let expected = deform::blend_occlusion(&head.mesh, &head.shapes, &weights);
+        for (i, (a, b)) in found.iter().zip(&expected).enumerate() {
+            // Half a step of 1/511 for each of two values, times weights up to 1 in sum.
+            assert!((a - b).abs() < 1.5 / 511.0, "{weights:?}, point {i}: {a} {b}");
+        }
+        if weights == [0.0, 0.0] {
+            assert_eq!(found, head.mesh.occlusion, "at rest nothing changes");
+        }
+    }
+}
+
+#[test]
+fn an_even_sky_comes_back_as_albedo_and_reflection_and_never_as_more() {
+    let Some(mut renderer) = renderer() else { return };
+    // All that enters comes back, but for what is reflected in front: 1 - rho(normal) of the dome's gloss.
+    let table = ColorTable { width: 2, height: 2, texels: &[[1.0; 3]; 4] };
+    let head = dome();
+    let white = HeadOnGpu::new(renderer.gpu(), &head, &table).expect("the dome uploads");
+    let pale = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    for specular in SpecularMethod::ALL {
+        let mut settings = settings([65, 65]);
+        settings.appearance.specular = *specular;
+        settings.scatter = ScatterMethod::None;
+        // The dome has no back: a sky behind it would come through.
+        settings.transmit = TransmitMethod::None;
+        let state = FaceState::neutral(&head);
+        let mut light = |head: &HeadOnGpu| -> Vec<f32> {
+            draw(&mut renderer, head, &state, &[], &settings).expect("it draws");
+            // The sky of `draw` has a radiance of 0.5.
+            renderer.read_hdr().expect("light comes back").iter().map(|t| 2.0 * t[0]).collect()
+        };
+        let most = light(&pale).into_iter().fold(0.0, f32::max);
+        assert!((0.8..1.0).contains(&most), "{specular}: {most}");
+        let all = light(&white);
+        let front = all[32 * 65 + 32] - 1.0;
+        assert!((0.005..0.03).contains(&front), "{specular}: {front} is reflected in front");
+        // rho + (1 - rho) / (1 - front) is largest where all is diffuse; half floats round by 1/2048.
+        let most = all.into_iter().fold(0.0, f32::max);
+        assert!(most <= 1.0 / (1.0 - front) + 2e-3, "{specular}: {most}, {front} in front");
     }
 }
 

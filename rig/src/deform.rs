@@ -22,6 +22,16 @@ pub fn deform_points(mesh: &Mesh, shapes: &[BlendShape], weights: &[f32]) -> Vec
     points
 }
 
+/// Ambient visibility of each point, 0 to 1: that at rest plus the changes of every shape; 1 where the mesh has none.
+pub fn blend_occlusion(mesh: &Mesh, shapes: &[BlendShape], weights: &[f32]) -> Vec<f32> {
+    let rest = |i: usize| mesh.occlusion.get(i).copied().unwrap_or(1.0);
+    let mut sum: Vec<f32> = (0..mesh.points.len()).map(rest).collect();
+    for (shape, weight) in shapes.iter().zip(weights) {
+        shape.occlusion.iter().for_each(|c| sum[c.point as usize] += c.at(*weight));
+    }
+    sum.into_iter().map(|v| v.clamp(0.0, 1.0)).collect()
+}
+
 /// Unit normal of each point: the sum of the normals of its triangles weighted by area.
 ///
 /// Points whose triangles are all degenerate get +Z.
@@ -105,6 +115,7 @@ mod tests {
             name: "lift".into(),
             points: vec![1, 2],
             offsets: vec![Vec3::new(0.0, 0.0, 1.0); 2],
+            ..BlendShape::default()
         };
         let points = deform_points(&mesh, &[lift], &[1.0]);
         let slope = Vec3::new(-1.0, 0.0, 1.0).normalize();

@@ -131,6 +131,28 @@ pub struct BlendShape {
     pub points: Vec<u32>,
     /// Displacement at weight 1 of each of them, metres.
     pub offsets: Vec<Vec3>,
+    /// How [`Mesh::occlusion`] changes, also of points that do not move; points strictly increasing. Empty where the shape
+    /// changes nothing or nobody measured it.
+    pub occlusion: Vec<OcclusionChange>,
+}
+
+/// Change of the ambient visibility of a point by a blend shape: opening the jaw by half does more than half.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OcclusionChange {
+    /// Index into [`Mesh::points`].
+    pub point: u32,
+    /// At weight 0.5, -1 to 1.
+    pub at_half: f32,
+    /// At weight 1, -1 to 1.
+    pub at_full: f32,
+}
+
+impl OcclusionChange {
+    /// Change at a weight, which counts as 0 to 1: the parabola through rest and both values.
+    pub fn at(&self, weight: f32) -> f32 {
+        let w = weight.clamp(0.0, 1.0);
+        4.0 * w * (1.0 - w) * self.at_half + w * (2.0 * w - 1.0) * self.at_full
+    }
 }
 
 /// The maps of a head, all in its texture space. Each is optional: what is missing is not drawn.
@@ -286,6 +308,15 @@ impl Head {
             }
             if shape.offsets.iter().any(|o| !o.is_finite()) {
                 return fail(at(), "an offset that is not finite".into(), "finite offsets");
+            }
+            if shape.occlusion.windows(2).any(|w| w[0].point >= w[1].point) {
+                return fail(at(), "unsorted points of occlusion".into(), "strictly increasing points");
+            }
+            let is_change = |v: f32| (-1.0..=1.0).contains(&v);
+            if let Some(c) = (shape.occlusion.iter()).find(|c| {
+                c.point as usize >= mesh.points.len() || !is_change(c.at_half) || !is_change(c.at_full)
+            }) {
+                return fail(at(), format!("{c:?}"), "changes from -1 to 1 at an existing point");
             }
         }
         self.maps.validate().or_else(|(at, found, expected)| fail(at, found, expected))

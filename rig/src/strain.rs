@@ -207,7 +207,12 @@ mod tests {
             .collect();
         let mesh = Mesh { points, vertices, triangles, ..Mesh::default() };
         let offsets = mesh.points.iter().map(|p| Vec3::new(-0.2 * p.x, 0.0, 0.0)).collect();
-        let shape = BlendShape { name: "squeeze".into(), points: (0..n * n).collect(), offsets };
+        let shape = BlendShape {
+            name: "squeeze".into(),
+            points: (0..n * n).collect(),
+            offsets,
+            ..BlendShape::default()
+        };
         for strain in shape_strain(&mesh, &shape) {
             assert!((strain.area + 0.2).abs() < 1e-5 && (strain.compression.x.abs() - 1.0).abs() < 1e-4);
             let p = StrainModel::default().predict(&strain);

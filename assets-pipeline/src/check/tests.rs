@@ -24,7 +24,12 @@ fn good() -> Head {
         parts: vec![Part { name: "skin".into(), material: Material::Skin, triangles: 0..2 }],
         ..Mesh::default()
     };
-    let shape = BlendShape { name: "jawOpen".into(), points: vec![0], offsets: vec![Vec3::Y * 0.01] };
+    let shape = BlendShape {
+        name: "jawOpen".into(),
+        points: vec![0],
+        offsets: vec![Vec3::Y * 0.01],
+        ..BlendShape::default()
+    };
     let flat = |v: &[f32]| Map::filled(8, 8, v);
     let maps = SkinMaps {
         melanin: Some(flat(&[0.05])),
@@ -121,6 +126,7 @@ fn heads_of_wrong_size_shape_and_name() {
         name: name.into(),
         points: vec![1],
         offsets: vec![Vec3::X * length],
+        ..BlendShape::default()
     };
     let mut wrong = good();
     wrong.shapes.extend([

@@ -1,50 +1,177 @@
-//! Ambient visibility of each point in the rest pose.
+//! Ambient visibility of each point in the rest pose, and how blend shapes change it.
 //!
 //! `occlusion(p) = (1/pi) integral of V(p, w) cos(theta) dw`, estimated with cosine-weighted directions from a
 //! Hammersley set turned by a hash of the point (so that neighbours do not share a pattern). Same head, same values.
+//!
+//! A shape changes it where jaw, lips and lids open or close a cavity: the difference of the whole head's visibility at
+//! weights 0.5 and 1 to that at rest, with the same rays. The renderer adds differences by weight; `docs/occlusion.md` has the error
+//! against rays in the deformed head, and that of occlusion from the screen.
 
 use std::f32::consts::TAU;
 
+use glam::Vec3;
 use rayon::prelude::*;
-use rubor_rig::deform::point_normals;
-use rubor_rig::head::{Head, Material};
+use rubor_rig::deform::{deform_points, point_normals};
+use rubor_rig::head::{Head, Material, Mesh, OcclusionChange};
 
 use super::bvh::Bvh;
 
 /// Rays start this far off the surface, as part of the head's height: 0.1 mm on an adult head.
 const START: f32 = 3e-4;
+/// Points farther than this from all that a shape moves keep their visibility, as part of the head's height: 13 mm.
+const REACH: f32 = 0.04;
+/// Displacements below this, as part of the head's height, open and close nothing: 0.3 mm.
+const STILL: f32 = 9e-4;
+/// Changes of visibility below this at both weights are not kept.
+const LEAST_CHANGE: f32 = 0.02;
 
-/// Fills `head.mesh.occlusion` with `rays` rays a point.
+/// Shapes that change ambient visibility enough to be worth their bytes (`docs/occlusion.md`): jaw and lips that open the
+/// mouth, lids that slide over the ball, brows that come down. With each the shape that it is made for, if any.
+pub const SHAPES: [(&str, Option<&str>); 21] = [
+    ("jawOpen", None),
+    ("mouthClose", Some("jawOpen")),
+    ("mouthFunnel", None),
+    ("mouthUpperUpLeft", None),
+    ("mouthUpperUpRight", None),
+    ("mouthLowerDownLeft", None),
+    ("mouthLowerDownRight", None),
+    ("mouthRollUpper", None),
+    ("mouthRollLower", None),
+    ("eyeBlinkLeft", None),
+    ("eyeBlinkRight", None),
+    ("eyeSquintLeft", None),
+    ("eyeSquintRight", None),
+    ("cheekSquintLeft", None),
+    ("cheekSquintRight", None),
+    ("eyeWideLeft", None),
+    ("eyeWideRight", None),
+    ("eyeLookDownLeft", None),
+    ("eyeLookDownRight", None),
+    ("browDownLeft", None),
+    ("browDownRight", None),
+];
+
+/// What hides the sky from the places of a mesh.
 ///
-/// Only opaque parts occlude: not lashes, hair, wet shells and hidden ones. Those that overlap others get values all the
-/// same. Eyes do not occlude themselves, so that the cornea's edge stays even.
-pub fn bake(head: &mut Head, rays: u32) {
-    let mesh = &head.mesh;
-    let corners = |range: std::ops::Range<u32>| {
-        mesh.triangles[range.start as usize..range.end as usize]
-            .iter()
-            .map(|t| t.map(|v| mesh.points[mesh.vertices[v as usize].point as usize]))
-    };
-    let opaque = |m: Material| m.is_opaque();
-    let blockers = mesh.parts.iter().filter(|p| opaque(p.material));
-    let bvh = Bvh::new(blockers.flat_map(|p| corners(p.triangles.clone())).collect());
-    let normals = point_normals(mesh, &mesh.points);
-    let near = START * head.height();
-    let visibility = |i: usize| {
-        let (origin, normal) = (mesh.points[i] + near * normals[i], normals[i]);
+/// Only opaque parts: not lashes, hair, wet shells and hidden ones.
+pub struct Blockers {
+    bvh: Bvh,
+    near: f32,
+}
+
+impl Blockers {
+    /// The mesh with its points at `points`; `height` is that of the head, metres.
+    pub fn new(mesh: &Mesh, points: &[Vec3], height: f32) -> Self {
+        let corners = |range: std::ops::Range<u32>| {
+            mesh.triangles[range.start as usize..range.end as usize]
+                .iter()
+                .map(|t| t.map(|v| points[mesh.vertices[v as usize].point as usize]))
+        };
+        let opaque = |m: Material| m.is_opaque();
+        let blockers = mesh.parts.iter().filter(|p| opaque(p.material));
+        let bvh = Bvh::new(blockers.flat_map(|p| corners(p.triangles.clone())).collect());
+        Self { bvh, near: START * height }
+    }
+
+    /// Ambient visibility of a place with a normal, from `rays` rays whose pattern is turned by `turn` (of 1).
+    pub fn visibility(&self, place: Vec3, normal: Vec3, rays: u32, turn: f32) -> f32 {
+        let origin = place + self.near * normal;
         let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let turn = (i as u32).wrapping_mul(0x9E37_79B9) as f32 / 2_f32.powi(32);
         let open = (0..rays).filter(|k| {
             let u = (*k as f32 + 0.5) / rays as f32;
             let phi = TAU * (radical_inverse(*k) + turn);
             let (r, z) = (u.sqrt(), (1.0 - u).sqrt());
             let direction = r * (phi.cos() * tangent + phi.sin() * bitangent) + z * normal;
-            !bvh.hit(origin, direction, near, f32::INFINITY)
+            !self.bvh.hit(origin, direction, self.near, f32::INFINITY)
         });
         open.count() as f32 / rays.max(1) as f32
+    }
+
+    /// Whether a place with a normal sees the sky in a direction.
+    pub fn sees(&self, place: Vec3, normal: Vec3, direction: Vec3) -> bool {
+        !self.bvh.hit(place + self.near * normal, direction, self.near, f32::INFINITY)
+    }
+}
+
+/// Fills `head.mesh.occlusion` with `rays` rays a point.
+///
+/// Parts that do not occlude and overlap others get values all the same. Eyes do not occlude themselves, so that the
+/// cornea's edge stays even.
+pub fn bake(head: &mut Head, rays: u32) {
+    let everywhere = vec![true; head.mesh.points.len()];
+    let raw = of_pose(head, &head.mesh.points, rays, &everywhere);
+    head.mesh.occlusion = smooth(head, &raw);
+}
+
+/// Fills `occlusion` of the shapes `names` that the head has, with `rays` rays a point; a shape that is made for another
+/// counts on top of that. Points of eyes are left out: the renderer finds their lids in the picture.
+pub fn bake_shapes(head: &mut Head, rays: u32, names: &[(&str, Option<&str>)]) {
+    let is_eye = points_of_eyes(head);
+    let rest = of_pose(head, &head.mesh.points, rays, &vec![true; is_eye.len()]);
+    for (name, base) in names {
+        let Some(index) = head.shape_index(name) else { continue };
+        let base = base.and_then(|b| head.shape_index(b));
+        let mut wanted = near_motion(head, index);
+        wanted.iter_mut().zip(&is_eye).for_each(|(wanted, eye)| *wanted &= !eye);
+        let at = |own: f32, other: f32| {
+            let mut weights = vec![0.0; head.shapes.len()];
+            base.into_iter().for_each(|b| weights[b] = other);
+            weights[index] = own;
+            of_pose(head, &deform_points(&head.mesh, &head.shapes, &weights), rays, &wanted)
+        };
+        let before = if base.is_some() { [at(0.0, 0.5), at(0.0, 1.0)] } else { [rest.clone(), rest.clone()] };
+        let after = [at(0.5, 0.5), at(1.0, 1.0)];
+        // Smoothing is linear: that of differences is the difference.
+        let change = |k: usize| -> Vec<f32> {
+            let difference = |i: usize| if wanted[i] { after[k][i] - before[k][i] } else { 0.0 };
+            smooth(head, &(0..wanted.len()).map(difference).collect::<Vec<f32>>())
+        };
+        let changes = change(0).into_iter().zip(change(1)).enumerate();
+        let changes = changes.filter(|(i, _)| !is_eye[*i]).map(|(i, (at_half, at_full))| OcclusionChange {
+            point: i as u32,
+            at_half,
+            at_full,
+        });
+        let kept: Vec<_> = changes.filter(|c| c.at_half.abs().max(c.at_full.abs()) >= LEAST_CHANGE).collect();
+        head.shapes[index].occlusion = kept;
+    }
+}
+
+fn points_of_eyes(head: &Head) -> Vec<bool> {
+    let mut is_eye = vec![false; head.mesh.points.len()];
+    for part in head.mesh.parts.iter().filter(|p| p.material == Material::Eye) {
+        let triangles = &head.mesh.triangles[part.triangles.start as usize..part.triangles.end as usize];
+        for v in triangles.as_flattened() {
+            is_eye[head.mesh.vertices[*v as usize].point as usize] = true;
+        }
+    }
+    is_eye
+}
+
+/// Points within reach of what a shape moves. On a grid: what lies in the cell of a moved point or beside it.
+fn near_motion(head: &Head, shape: usize) -> Vec<bool> {
+    let height = head.height().max(f32::MIN_POSITIVE);
+    let cell = |p: Vec3| (p / (REACH * height)).floor().as_ivec3();
+    let shape = &head.shapes[shape];
+    let mut cells = std::collections::HashSet::new();
+    for (p, offset) in shape.points.iter().zip(&shape.offsets) {
+        if offset.length() > STILL * height {
+            let center = cell(head.mesh.points[*p as usize]);
+            cells.extend((0..27).map(|i| center + glam::IVec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)));
+        }
+    }
+    head.mesh.points.iter().map(|p| cells.contains(&cell(*p))).collect()
+}
+
+/// Ambient visibility of the points that are asked for, 0 for others.
+fn of_pose(head: &Head, points: &[Vec3], rays: u32, wanted: &[bool]) -> Vec<f32> {
+    let blockers = Blockers::new(&head.mesh, points, head.height());
+    let normals = point_normals(&head.mesh, points);
+    let visibility = |i: usize| {
+        let turn = (i as u32).wrapping_mul(0x9E37_79B9) as f32 / 2_f32.powi(32);
+        if wanted[i] { blockers.visibility(points[i], normals[i], rays, turn) } else { 0.0 }
     };
-    let occlusion: Vec<f32> = (0..mesh.points.len()).into_par_iter().map(visibility).collect();
-    head.mesh.occlusion = smooth(head, &occlusion);
+    (0..points.len()).into_par_iter().map(visibility).collect()
 }
 
 /// Van der Corput sequence in base 2.
@@ -75,7 +202,8 @@ fn smooth(head: &Head, values: &[f32]) -> Vec<f32> {
 mod tests {
     use super::*;
     use glam::{Vec2, Vec3};
-    use rubor_rig::head::{Mesh, Part, Vertex};
+    use rubor_rig::deform::blend_occlusion;
+    use rubor_rig::head::{BlendShape, Mesh, Part, Vertex};
 
     /// Squares of one part each: origin, edges, material.
     fn squares(list: &[(Vec3, Vec3, Vec3, Material)]) -> Head {
@@ -110,5 +238,59 @@ mod tests {
         let first = head.mesh.occlusion.clone();
         bake(&mut head, 256);
         assert_eq!(head.mesh.occlusion, first);
+    }
+
+    /// A floor of 8 x 8 squares under a lid that a shape slides away.
+    fn under_a_lid() -> Head {
+        const N: u32 = 9;
+        let mut mesh = Mesh::default();
+        for i in 0..N * N {
+            let (x, y) = ((i % N) as f32 / 8.0 - 0.5, (i / N) as f32 / 8.0 - 0.5);
+            mesh.points.push(Vec3::new(x, y, 0.0));
+        }
+        for i in (0..N * (N - 1)).filter(|i| i % N < N - 1) {
+            mesh.triangles.extend([[i, i + 1, i + N], [i + 1, i + N + 1, i + N]]);
+        }
+        let floor = mesh.triangles.len() as u32;
+        mesh.points
+            .extend([(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)].map(|(x, y)| Vec3::new(x, y, 0.2)));
+        // Far off: makes the head so high that all of the floor is within reach of the lid.
+        mesh.points.push(Vec3::Y * 9.5);
+        mesh.triangles.extend([[N * N, N * N + 1, N * N + 2], [N * N, N * N + 2, N * N + 3]]);
+        mesh.vertices = (0..N * N + 5).map(|point| Vertex { point, uv: Vec2::ZERO }).collect();
+        let part = |triangles| Part { name: String::new(), material: Material::Skin, triangles };
+        mesh.parts = vec![part(0..floor), part(floor..floor + 2)];
+        let slide = BlendShape {
+            name: "slide".into(),
+            points: (N * N..N * N + 4).collect(),
+            offsets: vec![Vec3::X; 4],
+            ..BlendShape::default()
+        };
+        Head { mesh, shapes: vec![slide], ..Head::default() }
+    }
+
+    #[test]
+    fn changes_at_rest_and_at_their_weights_are_those_of_the_posed_head() {
+        let mut head = under_a_lid();
+        bake(&mut head, 512);
+        let rest = head.mesh.occlusion.clone();
+        bake_shapes(&mut head, 512, &[("slide", None), ("other", None)]);
+        assert_eq!(head.mesh.occlusion, rest);
+        assert_eq!(blend_occlusion(&head.mesh, &head.shapes, &[0.0]), rest);
+        let mut posed = head.clone();
+        for weight in [0.5f32, 1.0] {
+            posed.mesh.points = deform_points(&head.mesh, &head.shapes, &[weight]);
+            let everywhere = vec![true; posed.mesh.points.len()];
+            let truth = smooth(&head, &of_pose(&head, &posed.mesh.points, 512, &everywhere));
+            let blended = blend_occlusion(&head.mesh, &head.shapes, &[weight]);
+            let near = near_motion(&head, 0);
+            assert!(near[..81].iter().all(|n| *n));
+            let mut changed = 0;
+            for i in (0..truth.len()).filter(|i| near[*i]) {
+                assert!((truth[i] - blended[i]).abs() < LEAST_CHANGE, "{i}: {} {}", truth[i], blended[i]);
+                changed += u32::from((truth[i] - rest[i]).abs() > 0.2);
+            }
+            assert!(changed > 8, "{changed} changes make a poor test");
+        }
     }
 }

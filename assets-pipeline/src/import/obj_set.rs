@@ -159,6 +159,8 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     }
     if options.occlusion_rays > 0 {
         occlusion::bake(&mut head, options.occlusion_rays);
+        // Differences of the same rays: half of them have as little noise.
+        occlusion::bake_shapes(&mut head, options.occlusion_rays.div_ceil(2), &occlusion::SHAPES);
     }
     head.validate()?;
     Ok(head)

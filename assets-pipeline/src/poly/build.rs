@@ -71,5 +71,5 @@ fn sparse(shape: &Shape, new_point: &[u32], threshold: f32) -> BlendShape {
         .collect();
     moved.sort_unstable_by_key(|(p, _)| *p);
     let (points, offsets) = moved.into_iter().unzip();
-    BlendShape { name: shape.name.clone(), points, offsets }
+    BlendShape { name: shape.name.clone(), points, offsets, ..BlendShape::default() }
 }

@@ -238,7 +238,9 @@ fn remove_parts(head: &mut Head, gone: impl Fn(usize, &Part) -> bool) {
         out.triangles.extend(triangles.iter().map(|t| t.map(|v| new_vertex[v as usize])));
         out.parts.push(Part { triangles: start..out.triangles.len() as u32, ..part.clone() });
     }
-    for BlendShape { points, offsets, .. } in &mut head.shapes {
+    for BlendShape { points, offsets, occlusion, .. } in &mut head.shapes {
+        occlusion.retain(|c| used[c.point as usize]);
+        occlusion.iter_mut().for_each(|c| c.point = new_point[c.point as usize]);
         let kept = points.iter().zip(offsets.iter()).filter(|(p, _)| used[**p as usize]);
         (*points, *offsets) = kept.map(|(p, o)| (new_point[*p as usize], *o)).unzip();
     }
@@ -247,7 +249,7 @@ fn remove_parts(head: &mut Head, gone: impl Fn(usize, &Part) -> bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rubor_rig::head::Mesh;
+    use rubor_rig::head::{Mesh, OcclusionChange};
 
     /// A square of two triangles in the plane z = 0 with texture coordinates as places, and a shape that lifts its top.
     fn square(material: Material) -> Head {
@@ -259,7 +261,13 @@ mod tests {
             triangles: vec![[0, 1, 3], [0, 3, 2]],
             parts: vec![Part { name: "lashes-left-upper".into(), material, triangles: 0..2 }],
         };
-        let lift = BlendShape { name: "jawOpen".into(), points: vec![2, 3], offsets: vec![Vec3::Z; 2] };
+        let change = |point| OcclusionChange { point, at_half: 0.25, at_full: 0.5 };
+        let lift = BlendShape {
+            name: "jawOpen".into(),
+            points: vec![2, 3],
+            offsets: vec![Vec3::Z; 2],
+            occlusion: vec![change(0), change(2), change(3)],
+        };
         Head { mesh, shapes: vec![lift], ..Head::default() }
     }
 
@@ -295,5 +303,6 @@ mod tests {
         head.validate().unwrap();
         assert_eq!((head.mesh.points.len(), head.mesh.triangles.len()), (3, 1));
         assert_eq!(head.shapes[0].points, [2]);
+        assert_eq!(head.shapes[0].occlusion.iter().map(|c| c.point).collect::<Vec<_>>(), [0, 2]);
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use rubor_assets::import::materials::guess_material;
 use rubor_rig::expression::Inbetween;
-use rubor_rig::head::{BlendShape, Head, Material, Part, Vertex};
+use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange, Part, Vertex};
 
 use super::Options;
 use super::geometry::{Polygons, history, points, polygons, world_matrix};
@@ -380,7 +380,7 @@ impl Assembly<'_> {
         let mut head = self.head;
         let shape = |(name, offsets): (String, BTreeMap<u32, Vec3>)| {
             let (points, offsets) = offsets.into_iter().unzip();
-            BlendShape { name, points, offsets }
+            BlendShape { name, points, offsets, ..BlendShape::default() }
         };
         head.shapes = self.shapes.into_iter().map(shape).collect();
         let mut rig = None;
@@ -392,6 +392,12 @@ impl Assembly<'_> {
             head.provenance = appearance.provenance;
             if appearance.occlusion.len() == head.mesh.points.len() {
                 head.mesh.occlusion = appearance.occlusion;
+                for shape in &mut head.shapes {
+                    let changes = appearance.shape_occlusion.get(&shape.name).into_iter().flatten();
+                    shape.occlusion = changes
+                        .map(|&(point, at_half, at_full)| OcclusionChange { point, at_half, at_full })
+                        .collect();
+                }
             }
         }
         Built { head, inbetweens: self.inbetweens, weights: self.weights, meshes, rig, carrier }

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
+const BYTE: u32 = 5120;
 const UNSIGNED_SHORT: u32 = 5123;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
@@ -78,6 +79,16 @@ impl Buffer {
         self.accessor(json!({
             "bufferView": view, "componentType": UNSIGNED_SHORT, "normalized": true,
             "count": values.len(), "type": "SCALAR",
+        }))
+    }
+
+    /// Pairs from -1 to 1 as normalized 8-bit integers.
+    pub(super) fn normalized_bytes(&mut self, values: &[[f32; 2]]) -> usize {
+        let steps: Vec<[i8; 2]> =
+            values.iter().map(|v| v.map(|v| (v.clamp(-1.0, 1.0) * 127.0).round() as i8)).collect();
+        let view = self.view(bytemuck::cast_slice(&steps), Target::None);
+        self.accessor(json!({
+            "bufferView": view, "componentType": BYTE, "normalized": true, "count": values.len(), "type": "VEC2",
         }))
     }
 

@@ -34,7 +34,7 @@ use super::performance::{Performance, PerformanceCurves};
 use super::skin_color::shape_colors;
 use super::{TextureFormat, write_whole};
 use crate::error::ExportError;
-use crate::facial_appearance::{FacialAppearance, NAME, VERSION};
+use crate::facial_appearance::{FacialAppearance, NAME, ShapeOcclusionEntry, VERSION};
 
 /// What goes into the file beside the head.
 #[derive(Clone, Debug)]
@@ -141,6 +141,17 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
     let materials = materials::write(head, options, factor, &mut buffer)?;
     let maps = maps::write(&head.maps, &options.maps, &mut buffer)?;
     let occlusion = (!head.mesh.occlusion.is_empty()).then(|| buffer.normalized(&head.mesh.occlusion) as u32);
+    let shape_occlusion = (kept.iter().map(|s| &head.shapes[*s]).filter(|s| !s.occlusion.is_empty()))
+        .map(|shape| {
+            let points: Vec<u32> = shape.occlusion.iter().map(|c| c.point).collect();
+            let changes: Vec<[f32; 2]> = shape.occlusion.iter().map(|c| [c.at_half, c.at_full]).collect();
+            ShapeOcclusionEntry {
+                shape: shape.name.clone(),
+                points: buffer.indices(&points, head.mesh.points.len(), buffer::Target::None) as u32,
+                changes: buffer.normalized_bytes(&changes) as u32,
+            }
+        })
+        .collect();
     let as_json = |what: &str, value: Result<Value, serde_json::Error>| {
         value.map_err(|e| ExportError::Encode { what: what.into(), reason: e.to_string() })
     };
@@ -151,6 +162,7 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
         point_count: head.mesh.points.len() as u32,
         parts,
         occlusion,
+        shape_occlusion,
         landmarks: head.landmarks.iter().map(|(name, p)| (name.clone(), p.to_array())).collect(),
         maps,
         provenance: head.provenance.clone(),

@@ -56,7 +56,7 @@ pub(super) fn read(document: &Document) -> Result<Head, ImportError> {
     head.shapes = (builder.shapes.into_iter())
         .map(|(name, moved)| {
             let (points, offsets) = moved.into_iter().unzip();
-            BlendShape { name, points, offsets }
+            BlendShape { name, points, offsets, ..BlendShape::default() }
         })
         .collect();
     Ok(head)

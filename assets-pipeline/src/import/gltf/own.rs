@@ -2,7 +2,9 @@
 
 use glam::{Vec2, Vec3};
 use gltf::Semantic;
-use rubor_rig::head::{BlendShape, Distribution, Head, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
+use rubor_rig::head::{
+    BlendShape, Distribution, Head, Mesh, OcclusionChange, Part, SkinMaps, Vertex, WrinkleZone,
+};
 use rubor_rig::map::Map;
 
 use super::document::Document;
@@ -35,6 +37,22 @@ pub(super) fn read(document: &Document, extension: &serde_json::Value) -> Result
         let at = format!("{NAME}, occlusion");
         let values = accessor::floats::<1>(document, &at, &accessor::by_index(document, &at, index)?)?;
         head.mesh.occlusion = values.into_iter().map(|[v]| v).collect();
+    }
+    for entry in &extension.shape_occlusion {
+        let at = format!("{NAME}, occlusion of shape {}", entry.shape);
+        let points = accessor::integers(document, &at, &accessor::by_index(document, &at, entry.points)?)?;
+        let changes =
+            accessor::floats::<2>(document, &at, &accessor::by_index(document, &at, entry.changes)?)?;
+        if points.len() != changes.len() {
+            let found = format!("{} points and {} changes", points.len(), changes.len());
+            return Err(document.fail(&at, found, "as many of each"));
+        }
+        let Some(index) = head.shape_index(&entry.shape) else {
+            return Err(document.fail(&at, "no such shape", "one of the mesh's targetNames"));
+        };
+        head.shapes[index].occlusion = (points.into_iter().zip(changes))
+            .map(|(point, [at_half, at_full])| OcclusionChange { point, at_half, at_full })
+            .collect();
     }
     Ok(ImportedHead { head, rig: extension.rig, sequence: extension.sequence, animation: None })
 }
@@ -126,7 +144,7 @@ fn geometry(
     let shapes = names.into_iter().zip(shapes).map(|(name, offsets)| {
         let moved = offsets.into_iter().enumerate().filter_map(|(p, o)| Some((p as u32, o?)));
         let (points, offsets) = moved.unzip();
-        BlendShape { name, points, offsets }
+        BlendShape { name, points, offsets, ..BlendShape::default() }
     });
     Ok((mesh, shapes.collect()))
 }

@@ -16,7 +16,7 @@
 
 mod method;
 
-pub use method::{AppearanceMethods, ColorMethod, WrinkleMethod};
+pub use method::{AppearanceMethods, ColorMethod, SpecularMethod, WrinkleMethod};
 
 use crate::gpu::Gpu;
 use crate::head::{APPEARANCE_SIZE, MAX_DISTRIBUTIONS, MAX_ZONES, MapsOnGpu};

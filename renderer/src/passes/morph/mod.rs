@@ -1,12 +1,17 @@
-//! Blend shapes: rest points to deformed points in world space.
+//! Blend shapes: rest points to deformed points in world space, and how much of the sky they see.
 //!
 //! ```text
-//! rest, deltas sorted by point, shape weights --morph--> positions (world, metres; w = rest occlusion)
+//! rest, deltas sorted by point, shape weights --morph--> positions (world, metres; w = ambient visibility)
 //! ```
 //!
 //! Theory: linear blend shapes, `p = world_from_head (rest + sum_i w_i offset_i)` (Lewis et al. 2014, "Practice and
 //! theory of blendshape facial models"). The thesis streams shapes out pass by pass (papers/004 section 7.6); here
 //! one dispatch gathers, point by point, only the shapes that move the point.
+//!
+//! Ambient visibility follows by the same weights: what a shape changes at 0.5 and 1 was traced at import
+//! (`rubor_rig::head::OcclusionChange`; `docs/occlusion.md` has its error). The sum over shapes is clamped to 0..1.
+//!
+//! Truth: `rubor_rig::deform::{deform_points, blend_occlusion}`.
 //!
 //! Does not: normals (see `surface_frames`), combination shapes (the rig resolves them to weights).
 //!

@@ -8,8 +8,10 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-/// Entries on a side: cosine of the viewer along a row, roughness down; the first and last stand at 0 and 1.
-pub(crate) const SIDE: u32 = 32;
+/// Cosines of the viewer along a row and roughnesses down; the first and last stand at 0 and 1.
+const SIDE: u32 = 32;
+/// Columns and rows of the table: one column more holds the mean over the hemisphere.
+pub(crate) const SIZE: [u32; 2] = [SIDE + 1, SIDE];
 /// Samples along and around the lobe.
 const SAMPLES: [u32; 2] = [24, 24];
 /// Least square of |L + V|, as in shade.wgsl: where both graze, the lobe would leave any bound.
@@ -47,15 +49,54 @@ pub(crate) fn scale_and_bias(roughness: f32, cosine: f32) -> [f32; 2] {
     [scale / count, bias / count]
 }
 
-/// The table, row by row, as texels.
-pub(crate) fn table() -> Vec<[f32; 4]> {
+/// The table, row by row, as texels: scale and bias of one lobe, then of two with factors of roughness and the share of
+/// the second.
+pub(crate) fn table([first, second, share]: [f32; 3]) -> Vec<[f32; 4]> {
     let at = |i: u32| i as f32 / (SIDE - 1) as f32;
-    (0..SIDE * SIDE)
-        .map(|i| {
-            let [scale, bias] = scale_and_bias(at(i / SIDE), at(i % SIDE));
-            [scale, bias, 0.0, 0.0]
-        })
-        .collect()
+    let texel = |roughness: f32, cosine: f32| {
+        let one = scale_and_bias(roughness, cosine);
+        let mut skin = one;
+        if share > 0.0 {
+            let (a, b) =
+                (scale_and_bias(first * roughness, cosine), scale_and_bias(second * roughness, cosine));
+            skin = std::array::from_fn(|k| (1.0 - share) * a[k] + share * b[k]);
+        }
+        [one[0], one[1], skin[0], skin[1]]
+    };
+    let mut texels = Vec::new();
+    for row in 0..SIDE {
+        let of_cosines: Vec<[f32; 4]> = (0..SIDE).map(|i| texel(at(row), at(i))).collect();
+        texels.extend_from_slice(&of_cosines);
+        texels.push(mean(&of_cosines));
+    }
+    texels
+}
+
+/// `2 integral of f(c) c dc`, f a straight line between cosines.
+fn mean(of_cosines: &[[f32; 4]]) -> [f32; 4] {
+    let step = 1.0 / (of_cosines.len() - 1) as f32;
+    let mut sum = [0.0; 4];
+    for (i, ends) in of_cosines.windows(2).enumerate() {
+        let (a, b) = (i as f32 * step, (i + 1) as f32 * step);
+        for k in 0..4 {
+            // Exact for the product of two straight lines.
+            sum[k] += step / 3.0 * (ends[0][k] * (2.0 * a + b) + ends[1][k] * (a + 2.0 * b));
+        }
+    }
+    sum
+}
+
+/// What enters skin from a lamp at a cosine over what enters of an even sky, for tests: the factor of shade.wgsl.
+#[cfg(test)]
+pub(crate) fn entering(specular: f32, roughness: f32, cosine: f32) -> f64 {
+    let rho = |cosine: f32| {
+        let [scale, bias] = scale_and_bias(roughness, cosine);
+        f64::from(specular * (0.028 * scale + bias))
+    };
+    let n = 200;
+    let mean =
+        (0..n).map(|i| (i as f32 + 0.5) / n as f32).map(|c| 2.0 * f64::from(c) * rho(c) / f64::from(n));
+    (1.0 - rho(cosine)) / (1.0 - mean.sum::<f64>())
 }
 
 /// The lobe over f0 = 1 without Fresnel, for tests: D / |L + V|^2.
@@ -100,10 +141,28 @@ mod tests {
     fn a_polished_surface_reflects_what_fresnel_says_and_none_creates_light() {
         let [scale, bias] = scale_and_bias(0.02, 1.0);
         assert!((scale - 1.0).abs() < 0.01 && bias < 1e-3, "{scale} {bias}");
-        for texel in table() {
-            // Of skin, f0 = 0.028: the lobe alone is not bounded by one at grazing angles.
-            let albedo = 0.028 * texel[0] + texel[1];
-            assert!((0.0..=1.0).contains(&albedo), "{texel:?}");
+        for lobes in [[1.0, 1.0, 0.0], [0.72, 1.5, 0.278]] {
+            for row in table(lobes).chunks(SIZE[0] as usize) {
+                for pair in [0, 2] {
+                    // Of skin, f0 = 0.028: the lobe alone is not bounded by one at grazing angles.
+                    let albedo = |texel: &[f32; 4]| 0.028 * texel[pair] + texel[pair + 1];
+                    assert!(row.iter().all(|t| (0.0..=1.0).contains(&albedo(t))), "{row:?}");
+                    let [.., mean] = row else { panic!("no columns") };
+                    // The share of an even sky that enters, lamp by lamp, is that of the mean.
+                    let n = 4000;
+                    let entering: f64 = (0..n)
+                        .map(|i| {
+                            let c = (f64::from(i) + 0.5) / f64::from(n);
+                            let x = c * f64::from(SIDE - 1);
+                            let (i, t) = (x as usize, x.fract());
+                            let between =
+                                f64::from(albedo(&row[i])) * (1.0 - t) + f64::from(albedo(&row[i + 1])) * t;
+                            2.0 * c * (1.0 - between) / f64::from(n)
+                        })
+                        .sum();
+                    assert!((entering - f64::from(1.0 - albedo(mean))).abs() < 1e-4);
+                }
+            }
         }
     }
 }

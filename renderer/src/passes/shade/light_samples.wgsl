@@ -40,9 +40,10 @@ fn light_samples(@builtin(global_invocation_id) id: vec3u) {
         surface_of(corners, vec3f(1.0 - at.x - at.y, at), vec2f(footprint, 0.0), vec2f(0.0, footprint), 1.0);
     var diffuse = ambient_diffuse(surface);
     var specular = vec3f(0.0);
+    let entering = 1.0 / (1.0 - mean_reflected(surface));
     let turn = 2.0 * PI * gradient_noise(vec2f(f32(id.x % 4096u), f32(id.x / 4096u)));
     for (var i = 0u; i < view.light_count; i++) {
-        add_light(params.lights[i], surface, surface.smooth_normal, turn, &diffuse, &specular);
+        add_light(params.lights[i], surface, surface.smooth_normal, entering, turn, &diffuse, &specular);
     }
     sample_light[id.x] = vec4f(diffuse, surface.scattering);
 }

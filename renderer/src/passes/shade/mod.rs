@@ -12,6 +12,23 @@
 //! Szirmay-Kalos specular with the Beckmann distribution (papers/002, papers/004); percentage-closer soft shadows;
 //! order-2 spherical harmonics and a prefiltered map for the environment; multiple-bounce ambient occlusion.
 //!
+//! The diffuse light of a lamp enters after the specular lobe took its share, and leaves towards the viewer likewise
+//! (Kelemen and Szirmay-Kalos 2001, eq. 10 and 11; d'Eon and Luebke 2007, rho_dt). The albedo of skin is the reflectance
+//! under an even sky seen from in front, without the surface's own reflection (`docs/color.md`), so
+//!
+//! ```text
+//! f = albedo / pi (1 - rho(L)) (1 - rho(V)) / ((1 - mean rho) (1 - rho(normal)))
+//! ```
+//!
+//! with rho of `directional_albedo`; the factor of V goes with the albedo, as scattering comes before it. Under an even
+//! sky diffuse and specular light add up to rho(V) + albedo (1 - rho(V)) / (1 - rho(normal)), which is no more than 1 where the
+//! albedo leaves room for rho(normal).
+//!
+//! Specular occlusion: the share of the lobe inside the cone of ambient visibility, which leans towards the viewer
+//! (`specular_visibility`; `docs/occlusion.md`); for the environment and for lamps without a shadow map.
+//!
+//! Highlights of skin may have two lobes ([`SpecularMethod`]): D is their mix, so energy is that of the mix of tables.
+//!
 //! Differs from the sources: slope variance that minification hides widens the Beckmann lobe (Toksvig 2005), and so
 //! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
 //!
@@ -34,7 +51,7 @@
 //!
 //! Does not: reflect one part of the head in another; carry light between parts of an eye or the mouth.
 
-mod directional_albedo;
+pub(crate) mod directional_albedo;
 #[cfg(test)]
 mod tests;
 
@@ -50,7 +67,7 @@ use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
-use crate::passes::appearance::{Blended, WrinkleMethod};
+use crate::passes::appearance::{Blended, SpecularMethod, WrinkleMethod};
 use crate::passes::shadow::LightView;
 use crate::scene::{Light, LightKind, MAX_LIGHTS};
 
@@ -145,6 +162,7 @@ pub(crate) struct Params {
     pub(crate) transmit_per_mm: f32,
     pub(crate) adds_differences: u32,
     pub(crate) pupil_mm: f32,
+    pub(crate) lobes: [f32; 4],
     pub(crate) ring_taps_mm: [f32; RINGS],
     pub(crate) ring_ends_mm: [f32; RINGS],
     pub(crate) middle: [f32; 4],
@@ -269,6 +287,7 @@ pub(crate) struct Shaded<'a> {
     pub(crate) pupil_mm: f32,
     pub(crate) wrinkles: WrinkleMethod,
     pub(crate) world_from_head: Mat4,
+    pub(crate) specular: SpecularMethod,
 }
 
 /// The pipeline of the pass.
@@ -281,8 +300,8 @@ pub(crate) struct Shade {
     compare: wgpu::Sampler,
     black: wgpu::TextureView,
     black_array: wgpu::TextureView,
-    /// Share of an even sky that the specular lobe reflects.
-    directional_albedo: wgpu::TextureView,
+    /// Share of an even sky that the specular lobes of a method reflect.
+    directional_albedo: (SpecularMethod, wgpu::TextureView),
 }
 
 impl Shade {
@@ -294,10 +313,9 @@ impl Shade {
         };
         let sampler = |d: &wgpu::SamplerDescriptor<'_>| gpu.device.create_sampler(d);
         let black = crate::texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]);
-        let side = [directional_albedo::SIDE; 2];
-        let table = vec![vec![directional_albedo::table()]];
+        let specular = SpecularMethod::default();
         Self {
-            directional_albedo: crate::texture::upload_half(gpu, "directional albedo", side, &table),
+            directional_albedo: (specular, upload_directional_albedo(gpu, specular)),
             pipeline: gpu.compute_pipeline("shade", SHADER, "shade"),
             samples_pipeline: None,
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
@@ -314,6 +332,13 @@ impl Shade {
             }),
             black_array: crate::texture::array_view(&black),
             black,
+        }
+    }
+
+    /// Makes what the method needs.
+    pub(crate) fn prepare_specular(&mut self, gpu: &Gpu, method: SpecularMethod) {
+        if self.directional_albedo.0 != method {
+            self.directional_albedo = (method, upload_directional_albedo(gpu, method));
         }
     }
 
@@ -349,7 +374,7 @@ impl Shade {
                 texture(lighting.first.map_or(lighting.ids, |f| f.0)),
                 texture(lighting.first.map_or(lighting.depth, |f| f.1)),
                 texture(lighting.transmittance.map_or(&self.black, |t| &t.table)),
-                texture(&self.directional_albedo),
+                texture(&self.directional_albedo.1),
             ],
         );
         let head = gpu.bind(
@@ -422,6 +447,7 @@ impl Shade {
                 (5, sampler(&self.trilinear_repeat)),
                 (6, sampler(&self.linear_clamp)),
                 (7, sampler(&self.compare)),
+                (12, texture(&self.directional_albedo.1)),
             ],
         );
         let head = bind(
@@ -450,6 +476,11 @@ impl Shade {
     }
 }
 
+fn upload_directional_albedo(gpu: &Gpu, method: SpecularMethod) -> wgpu::TextureView {
+    let table = vec![vec![directional_albedo::table(method.lobes())]];
+    crate::texture::upload_half(gpu, "directional albedo", directional_albedo::SIZE, &table)
+}
+
 /// Numbers of the pass for one head.
 fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
     let maps = shaded.head.maps.as_ref();
@@ -473,6 +504,10 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
         adds_differences: u32::from(shaded.wrinkles == WrinkleMethod::Difference),
         pupil_mm: shaded.pupil_mm,
         transmit_per_mm: lighting.transmittance.map_or(0.0, |t| 1.0 / t.thickness_max_mm),
+        lobes: {
+            let [first, second, share] = shaded.specular.lobes();
+            [first, second, share, 0.0]
+        },
         ring_taps_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_taps_mm),
         ring_ends_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_ends_mm),
         hair_color: maps.map_or([0.0; 4], |m| {

@@ -22,6 +22,8 @@ struct Params {
     adds_differences: u32,
     // Diameter of the pupils, millimetres.
     pupil_mm: f32,
+    // Factors of the map's roughness for both specular lobes of skin, and the share of the second.
+    lobes: vec4f,
     // Radii of the taps and outer edges of the rings around the ray of a light, mm.
     ring_taps_mm: vec4f,
     ring_ends_mm: vec4f,
@@ -45,7 +47,8 @@ struct Params {
 @group(0) @binding(10) var first_depth: texture_depth_2d;
 // T(s): rgb over thickness.
 @group(0) @binding(11) var transmittance: texture_2d<f32>;
-// Reflected share of an even sky: r times f0, plus g; the cosine of the viewer along a row, roughness down.
+// Reflected share of an even sky: r times f0, plus g, of one lobe, and ba of the lobes of skin; the cosine of the viewer
+// along a row and after it the mean over all viewers, roughness down.
 @group(0) @binding(12) var directional_albedo: texture_2d<f32>;
 
 @group(1) @binding(0) var<storage, read> positions: array<vec4f>;
@@ -132,22 +135,26 @@ fn shade(@builtin(global_invocation_id) id: vec3u) {
 
     var diffuse = ambient_diffuse(surface);
     var specular = ambient_specular(surface, to_viewer);
+    let entering = 1.0 / (1.0 - mean_reflected(surface));
     let turn = 2.0 * PI * gradient_noise(vec2f(id.xy));
     for (var i = 0u; i < view.light_count; i++) {
-        add_light(params.lights[i], surface, to_viewer, turn, &diffuse, &specular);
+        add_light(params.lights[i], surface, to_viewer, entering, turn, &diffuse, &specular);
     }
     if params.transmit_per_mm > 0.0 && surface.scattering > 0.0 {
         diffuse += transmitted(surface, turn);
     }
 
+    // The albedo is what leaves towards a viewer in front of the surface.
+    let facing = clamp(dot(surface.normal, to_viewer), 0.0, 1.0);
+    let leaving = surface.albedo * (1.0 - reflected_share(surface, facing)) / (1.0 - reflected_share(surface, 1.0));
     if surface.scattering > 0.0 {
         textureStore(diffuse_out, id.xy, vec4f(diffuse, relative_depth_mm(view, textureLoad(depth, id.xy, 0))));
-        textureStore(albedo_out, id.xy, vec4f(surface.albedo, surface.scattering));
+        textureStore(albedo_out, id.xy, vec4f(leaving, surface.scattering));
         textureStore(direct_out, id.xy, vec4f(specular, 1.0));
     } else {
         textureStore(diffuse_out, id.xy, vec4f(0.0, 0.0, 0.0, FAR_MM));
         textureStore(albedo_out, id.xy, vec4f(0.0));
-        textureStore(direct_out, id.xy, vec4f(diffuse * surface.albedo + specular, 1.0));
+        textureStore(direct_out, id.xy, vec4f(diffuse * leaving + specular, 1.0));
     }
 }
 
@@ -354,10 +361,68 @@ fn highlight(cos_half: f32, roughness: f32, spread: f32) -> f32 {
     return beckmann(cos_half, sqrt(square(roughness) + 0.25 * square(spread)));
 }
 
+// Share of the light from (or towards) a direction that the specular lobe takes before the diffuse one (d'Eon and Luebke
+// 2007, rho_dt).
+fn reflected_share(surface: Surface, cosine: f32) -> f32 {
+    return reflected_at(surface, clamp(cosine, 0.0, 1.0) * f32(TABLE_COSINES - 1u));
+}
+
+// Its mean over the hemisphere, by cosine.
+fn mean_reflected(surface: Surface) -> f32 { return reflected_at(surface, f32(TABLE_COSINES)); }
+
+// Cosines of the table; one more column holds the mean.
+const TABLE_COSINES = 32u;
+
+fn reflected_at(surface: Surface, column: f32) -> f32 {
+    let size = vec2f(textureDimensions(directional_albedo));
+    let entry = (vec2f(column, surface.roughness * (size.y - 1.0)) + 0.5) / size;
+    let texel = textureSampleLevel(directional_albedo, linear_clamp, entry, 0.0);
+    let pair = select(texel.rg, texel.ba, surface.scattering > 0.0);
+    return surface.specular * min(surface.f0 * pair.x + pair.y, 1.0);
+}
+
+// Distribution of half vectors: one lobe, or two in skin.
+fn distribution(surface: Surface, cos_half: f32, spread: f32) -> f32 {
+    if surface.scattering == 0.0 {
+        return highlight(cos_half, surface.roughness, spread);
+    }
+    let first = highlight(cos_half, params.lobes.x * surface.roughness, spread);
+    if params.lobes.z == 0.0 {
+        return first;
+    }
+    return mix(first, highlight(cos_half, params.lobes.y * surface.roughness, spread), params.lobes.z);
+}
+
+// Solid angle that two cones share, over 2 pi (Oat and Sander 2007; the smooth step is theirs).
+fn shared_cone(first: f32, second: f32, between: f32) -> f32 {
+    let least = min(first, second);
+    return (1.0 - cos(least)) * (1.0 - smoothstep(abs(first - second), first + second, between));
+}
+
+// Share of the specular lobe about a direction that the head itself leaves open. Ambient visibility is that of a cone
+// (its square sine, by Lambert's law); what hides much of the sky and yet shows itself to the viewer is open on the
+// viewer's side, so the cone leans from the normal to the viewer as visibility falls. `docs/occlusion.md` has its error.
+fn specular_visibility(surface: Surface, to_viewer: vec3f, direction: vec3f, roughness: f32) -> f32 {
+    let visibility = surface.occlusion;
+    if visibility > 0.98 {
+        return 1.0;
+    }
+    let axis = normalize(mix(to_viewer, surface.smooth_normal, visibility));
+    let open = acos(sqrt(1.0 - visibility));
+    let lobe = min(2.0 * atan(1.2 * roughness), 0.5 * PI);
+    let between = acos(clamp(dot(axis, direction), -1.0, 1.0));
+    // Of what lies above the horizon.
+    let above = acos(clamp(dot(surface.smooth_normal, direction), 0.0, 1.0));
+    let whole = shared_cone(0.5 * PI, lobe, above);
+    return clamp(shared_cone(open, lobe, between) / max(whole, 1e-3), 0.0, 1.0);
+}
+
 fn add_light(
     light: Light,
     surface: Surface,
     to_viewer: vec3f,
+    // 1 / (1 - mean reflected share): an even sky enters the skin as if nothing were reflected, for albedos are measured so.
+    entering: f32,
     turn: f32,
     diffuse: ptr<function, vec3f>,
     specular: ptr<function, vec3f>,
@@ -375,14 +440,20 @@ fn add_light(
     // A bump cannot see a light that its surface does not face.
     let horizon = smoothstep(-0.05, 0.10, facing);
     let cos_diffuse = max(dot(surface.diffuse_normal, to_light), 0.0) * horizon;
-    *diffuse += irradiance * cos_diffuse / PI;
+    if cos_diffuse > 0.0 {
+        *diffuse += irradiance * cos_diffuse * entering * (1.0 - reflected_share(surface, cos_diffuse)) / PI;
+    }
 
     // Kelemen and Szirmay-Kalos 2001: the geometry term is 1 / |L + V|^2 (papers/002, papers/004).
     let cos_light = max(dot(surface.normal, to_light), 0.0) * horizon;
     if cos_light > 0.0 {
         let half_vector = to_light + to_viewer;
         let h = normalize(half_vector);
-        let brdf = highlight(dot(surface.normal, h), surface.roughness, lit.spread) * schlick(surface.f0, dot(h, to_viewer))
+        if light.shape.y < 0.0 {
+            // No shadow map keeps this lamp out of cavities.
+            irradiance *= specular_visibility(surface, to_viewer, to_light, surface.roughness);
+        }
+        let brdf = distribution(surface, dot(surface.normal, h), lit.spread) * schlick(surface.f0, dot(h, to_viewer))
             / max(dot(half_vector, half_vector), 0.3);
         *specular += irradiance * surface.specular * brdf * cos_light;
     }
@@ -603,14 +674,19 @@ fn ambient_specular(surface: Surface, to_viewer: vec3f) -> vec3f {
     let n = surface.normal;
     let cosine = clamp(dot(n, to_viewer), 0.0, 1.0);
     let r = reflect(-to_viewer, n);
-    // Level i of the map is filtered for roughness i / (levels - 1).
-    let level = sqrt(surface.roughness) * (params.environment_levels - 1.0);
-    let radiance = textureSampleLevel(environment, trilinear_repeat, place_in_sky(r), level).rgb;
-    let side = f32(textureDimensions(directional_albedo).x);
-    let entry = (vec2f(cosine, surface.roughness) * (side - 1.0) + 0.5) / side;
-    let reflected = textureSampleLevel(directional_albedo, linear_clamp, entry, 0.0).rg;
-    let fresnel = min(surface.f0 * reflected.r + reflected.g, 1.0);
-    // A cavity hides what the reflection would show (Lagarde and de Rousiers 2014, eq. 67).
-    let hidden = clamp(pow(cosine + surface.occlusion, exp2(-16.0 * surface.roughness - 1.0)) - 1.0 + surface.occlusion, 0.0, 1.0);
-    return params.environment_intensity * surface.specular * fresnel * hidden * radiance;
+    let uv = place_in_sky(r);
+    let is_skin = surface.scattering > 0.0;
+    var radiance = mirrored(uv, select(1.0, params.lobes.x, is_skin) * surface.roughness);
+    if is_skin && params.lobes.z > 0.0 {
+        radiance = mix(radiance, mirrored(uv, params.lobes.y * surface.roughness), params.lobes.z);
+    }
+    let open = specular_visibility(surface, to_viewer, r, surface.roughness);
+    return params.environment_intensity * reflected_share(surface, cosine) * open * radiance;
+}
+
+// The environment as a lobe of a roughness sees it.
+fn mirrored(uv: vec2f, roughness: f32) -> vec3f {
+    // Level i of the map is filtered for roughness (i / (levels - 1))^2.
+    let level = sqrt(roughness) * (params.environment_levels - 1.0);
+    return textureSampleLevel(environment, trilinear_repeat, uv, level).rgb;
 }

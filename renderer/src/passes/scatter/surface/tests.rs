@@ -8,6 +8,7 @@ use rubor_rig::head::{Head, Material, Mesh, Part, Vertex};
 use rubor_rig::skin::profile::Profile;
 
 use crate::passes::antialias;
+use crate::passes::shade::directional_albedo::entering;
 use crate::testing::gpu;
 use crate::{
     Camera, ColorTable, EnvironmentMap, FrameStats, Gpu, HeadInstance, HeadOnGpu, Light, LightKind, Renderer,
@@ -136,7 +137,8 @@ fn half_a_plane_in_light_gives_the_line_spread() {
     let expected = |i: usize| {
         let x = place(i, 24, 20.0)[0];
         let side = profile.channels.each_ref().map(|c| 0.5 + 0.5 * x.signum() * c.line_cdf(x.abs()));
-        side.map(|s| s * 2.0 / std::f64::consts::PI)
+        // Skin without maps has a gloss of 0.6 and a roughness of 0.32.
+        side.map(|s| s * entering(0.6, 0.32, 1.0) * 2.0 / std::f64::consts::PI)
     };
     let error = difference(&found, expected);
     assert!(error < 0.005, "{error}");
@@ -166,11 +168,13 @@ fn a_disk_of_light_gives_its_convolution() {
         let out = f64::from(outer).to_radians().cos();
         (out, f64::from(outer - 0.08).to_radians().cos().max(out + 1e-4))
     };
+    // Skin without maps has a gloss of 0.6 and a roughness of 0.32; rays stand within 5 degrees of upright.
+    let entering = entering(0.6, 0.32, 0.998);
     let irradiance = |x: f64, y: f64| {
         let square_m = (x * x + y * y) * 1e-6 + 0.01;
         let cosine = 0.1 / square_m.sqrt();
         let t = ((cosine - edge_out) / (edge_in - edge_out)).clamp(0.0, 1.0);
-        0.02 / square_m * cosine * t * t * (3.0 - 2.0 * t) / std::f64::consts::PI
+        entering * 0.02 / square_m * cosine * t * t * (3.0 - 2.0 * t) / std::f64::consts::PI
     };
     let profile = Profile::deon_six();
     // Quantiles of the light in 160 rings of 160 angles.
