@@ -46,7 +46,7 @@ fn the_kernel_is_the_equations() {
     let mut angles = Vec::new();
     for light in [-1.5f32, -0.8, -0.1, 0.4, 1.2] {
         for view in [-1.4f32, -0.5, 0.0, 0.3, 1.1] {
-            for azimuth in [0.0f32, 0.3, 1.6, 2.9, 3.1415] {
+            for azimuth in [0.0f32, 0.3, 1.6, 2.9, 3.1] {
                 angles.push([light, view, azimuth, 0.05]);
             }
         }

@@ -208,6 +208,5 @@ fn eye(
         (*surface).normal = normalize((*surface).normal + TEAR_TURN * film * rim);
         let unresolved = min(TEAR_TURN / (TEAR_HEIGHT_MM * pixels_per_mm), 1.0);
         (*surface).roughness = mix((*surface).roughness, clamp(0.12 + 0.2 * unresolved, 0.12, 0.3), film);
-        (*surface).specular *= mix(1.0, 1.8, film);
     }
 }
