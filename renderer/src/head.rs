@@ -71,6 +71,8 @@ pub struct HeadOnGpu {
     pub(crate) maps: Option<MapsOnGpu>,
     pub(crate) skin_color: wgpu::TextureView,
     pub(crate) bounds: (Vec3, Vec3),
+    /// Millimetres of skin across the unit square of the texture: the median over its triangles.
+    pub(crate) mm_per_texture: f32,
     /// Where its opaque parts can be.
     pub(crate) clusters: Vec<Cluster>,
     /// Bytes of buffers and textures on the device.
@@ -154,6 +156,7 @@ impl HeadOnGpu {
             maps,
             skin_color,
             bounds,
+            mm_per_texture: mm_per_texture(head),
             clusters: clusters(head),
             memory_bytes: 0,
         };
@@ -189,6 +192,24 @@ impl HeadOnGpu {
         });
         textures.sum()
     }
+}
+
+/// How large the texture of skin is at rest. Faces have the densest triangles, so their scale counts most.
+fn mm_per_texture(head: &Head) -> f32 {
+    let mesh = &head.mesh;
+    let skin = mesh.parts.iter().filter(|p| p.material == Material::Skin).flat_map(|p| p.triangles.clone());
+    let mut scales: Vec<f32> = skin
+        .filter_map(|t| {
+            let corners = mesh.triangles[t as usize].map(|v| mesh.vertices[v as usize]);
+            let [a, b, c] = corners.map(|v| mesh.points[v.point as usize]);
+            let [s, t, u] = corners.map(|v| v.uv);
+            let area_mm2 = 1e6 * (b - a).cross(c - a).length();
+            let area_texture = (t - s).perp_dot(u - s).abs();
+            (area_texture > 0.0 && area_mm2 > 0.0).then(|| (area_mm2 / area_texture).sqrt())
+        })
+        .collect();
+    let middle = scales.len() / 2;
+    if scales.is_empty() { 1.0 } else { *scales.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 fn texture_bytes(view: &wgpu::TextureView) -> u64 {

@@ -88,7 +88,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             environment_intensity as "environment_intensity", environment_levels as "environment_levels",
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", hair_color as "hair_color",
             is_second_sample as "is_second_sample", transmit_per_mm as "transmit_per_mm",
-            adds_differences as "adds_differences", pupil_mm as "pupil_mm", lobes as "lobes", ring_taps_mm as "ring_taps_mm",
+            adds_differences as "adds_differences", pupil_mm as "pupil_mm", lobes as "lobes", mm_per_texture as "mm_per_texture", ring_taps_mm as "ring_taps_mm",
             ring_ends_mm as "ring_ends_mm", middle as "middle", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
@@ -302,6 +302,18 @@ fn an_even_sky_comes_back_as_albedo_and_reflection_and_never_as_more() {
         let most = all.into_iter().fold(0.0, f32::max);
         assert!(most <= 1.0 / (1.0 - front) + 2e-3, "{specular}: {most}, {front} in front");
     }
+}
+
+#[test]
+fn the_scale_of_the_texture_is_that_of_the_skin() {
+    let Some(gpu) = gpu() else { return };
+    let mut head = dome();
+    // Half a metre across the texture.
+    for v in &head.mesh.vertices {
+        head.mesh.points[v.point as usize] = 0.5 * v.uv.extend(0.0);
+    }
+    let on_gpu = HeadOnGpu::new(gpu, &head, &WHITE_TABLE).expect("the plane uploads");
+    assert!((on_gpu.mm_per_texture - 500.0).abs() < 0.5, "{}", on_gpu.mm_per_texture);
 }
 
 #[test]

@@ -72,7 +72,7 @@ impl Hairs {
         }
         let beard = self.stubble * r.beard;
         if beard > 0.01 {
-            clear *= 1.0 - self.cropped(place, 0.95, 0.12, beard);
+            clear *= 1.0 - self.cropped(place, 0.95, 0.15, beard);
         }
         let scalp = self.scalp_density(place, r);
         if scalp > 0.01 {
@@ -125,6 +125,7 @@ impl Hairs {
     /// Cut hairs as dots over a tint.
     fn cropped(&self, place: Vec3, spacing_mm: f32, radius_mm: f32, density: f32) -> f32 {
         let radius = radius_mm.max(0.55 * self.finest_mm) / spacing_mm;
+        // A dot that is drawn larger than its hair covers as much as the hair.
         let faded = (radius_mm / spacing_mm / radius).powi(2);
         let mut dots = 0.0f32;
         features(place / spacing_mm, self.seed ^ 5, |h, d| {
@@ -135,7 +136,7 @@ impl Hairs {
         });
         // The tint of roots below the surface, and of hair behind hair where it is dense.
         let tint = 0.22 * density + 0.42 * density * density;
-        (tint + (0.9 - tint) * dots * faded.sqrt()).min(0.97)
+        (tint + (0.9 - tint) * dots * faded).min(0.97)
     }
 }
 

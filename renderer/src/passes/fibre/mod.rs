@@ -28,8 +28,8 @@
 //! towards the root. The environment gives a prefiltered look-up along the mirrored direction for the first lobe and its
 //! irradiance for the rest.
 //!
-//! Costs, on llvmpipe at 1280 x 720 with three lamps and an environment: the cropped hairs of a head take 2.4 to 3 times as
-//! long as with the light of the skin under them, 5 % of a frame.
+//! Costs, on an H100 at 1920 x 1080 with three lamps and an environment: the cropped hairs of a head take 0.285 ms where
+//! they took 0.183 with the light of the skin under them, brows and lashes 0.059 where they took 0.046.
 //!
 //! Does not: follow single paths between hairs, cast the hair's own shadow on skin, know elliptic fibres or their glints.
 

@@ -54,6 +54,8 @@ const STRAND_WIDTH = 0.00013;
 
 // Lashes are the stoutest hairs of the face, and each stands for two or three that cling together.
 const LASH_STOUTNESS = 1.7;
+// Optical depth of what lies over the mean hair of a brow; lashes stand alone. Chosen by eye.
+const BROW_DEPTH = 0.4;
 const LASH_COLOR = vec3f(0.016, 0.011, 0.008);
 
 @vertex
@@ -88,8 +90,9 @@ fn overlay_vertex(@builtin(vertex_index) corner: u32) -> Corner {
         let color = select(params.hair.rgb * mix(0.6, 1.6, random), LASH_COLOR, triangle.w == LASH);
         // Texture coordinates grow towards the tip, bitangents against them.
         let to_tip = -frame.bitangent_sign * along;
+        let depth = select(BROW_DEPTH, 0.0, triangle.w == LASH);
         radiance = hair_radiance(
-            Hair(center, outwards, to_tip, min(color, vec3f(1.0)), clamp(frame.occlusion, 0.0, 1.0), 0.0),
+            Hair(center, outwards, to_tip, min(color, vec3f(1.0)), clamp(frame.occlusion, 0.0, 1.0), depth),
             to_viewer,
         );
         clip += vec4f(normal * side * drawn * 2.0 / vec2f(view.size) * clip.w, 0.0, 0.0);

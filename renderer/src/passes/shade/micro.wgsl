@@ -1,8 +1,5 @@
 // Relief finer than the maps: a net of furrows that only close views resolve. Concatenated after shade.wgsl.
 
-// Millimetres of skin in the unit square of the texture; islands are near isometric.
-const MM_PER_TEXTURE = 430.0;
-
 fn micro_hash(p: vec2f) -> vec2f {
     let q = vec2f(dot(p, vec2f(127.1, 311.7)), dot(p, vec2f(269.5, 183.3)));
     return fract(sin(q) * 43758.5453);
@@ -40,16 +37,16 @@ fn cell_slopes(uv: vec2f) -> vec2f {
 
 // Slopes to add, and in z the roughness variance of what the pixel cannot resolve.
 fn micro_relief(uv: vec2f, duv_dx: vec2f, duv_dy: vec2f) -> vec3f {
-    let pixel_mm = MM_PER_TEXTURE * max(length(duv_dx), length(duv_dy));
+    let pixel_mm = params.mm_per_texture * max(length(duv_dx), length(duv_dy));
     var result = vec3f(0.0);
     // (mesh, mm; slope): the finer net is 20 micrometres deep.
     for (var i = 0; i < 2; i++) {
-        let mesh_mm = select(0.42, 0.19, i == 1);
+        let mesh_mm = select(0.65, 0.30, i == 1);
         let depth = select(0.060, 0.045, i == 1);
         // Cells of under three pixels would glitter: they become roughness.
         let seen = smoothstep(0.42 * mesh_mm, 0.17 * mesh_mm, pixel_mm);
         if seen > 0.0 {
-            result += vec3f(depth * seen * cell_slopes(uv * MM_PER_TEXTURE / mesh_mm + 17.0 * f32(i)), 0.0);
+            result += vec3f(depth * seen * cell_slopes(uv * params.mm_per_texture / mesh_mm + 17.0 * f32(i)), 0.0);
         }
         result.z += 0.35 * depth * depth * (1.0 - seen);
     }

@@ -162,7 +162,8 @@ pub(crate) struct Params {
     pub(crate) transmit_per_mm: f32,
     pub(crate) adds_differences: u32,
     pub(crate) pupil_mm: f32,
-    pub(crate) lobes: [f32; 4],
+    pub(crate) lobes: [f32; 3],
+    pub(crate) mm_per_texture: f32,
     pub(crate) ring_taps_mm: [f32; RINGS],
     pub(crate) ring_ends_mm: [f32; RINGS],
     pub(crate) middle: [f32; 4],
@@ -504,10 +505,8 @@ fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
         adds_differences: u32::from(shaded.wrinkles == WrinkleMethod::Difference),
         pupil_mm: shaded.pupil_mm,
         transmit_per_mm: lighting.transmittance.map_or(0.0, |t| 1.0 / t.thickness_max_mm),
-        lobes: {
-            let [first, second, share] = shaded.specular.lobes();
-            [first, second, share, 0.0]
-        },
+        lobes: shaded.specular.lobes(),
+        mm_per_texture: shaded.head.mm_per_texture,
         ring_taps_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_taps_mm),
         ring_ends_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_ends_mm),
         hair_color: maps.map_or([0.0; 4], |m| {

@@ -9,7 +9,7 @@ const LOWER_TEETH = array<f32, 8>(0.0, 5.2, 10.9, 17.7, 24.7, 31.8, 42.8, 53.5);
 // at g = 0.93 and 6 / mm at g = 0.96).
 const TOOTH_SPREAD_MM = 1.3;
 const LINING_SPREAD_MM = 1.5;
-// Papillae of the tongue in the unit square of the texture: one a millimetre on the default head.
+// Papillae of the tongue across the unit square of the texture, by eye on the default head.
 const LINING_CELLS = 4500.0;
 
 fn teeth(surface: ptr<function, Surface>, uv: vec2f, tangent: vec3f, bitangent: vec3f) {

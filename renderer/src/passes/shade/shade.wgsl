@@ -23,7 +23,9 @@ struct Params {
     // Diameter of the pupils, millimetres.
     pupil_mm: f32,
     // Factors of the map's roughness for both specular lobes of skin, and the share of the second.
-    lobes: vec4f,
+    lobes: vec3f,
+    // Millimetres of skin across the unit square of the texture.
+    mm_per_texture: f32,
     // Radii of the taps and outer edges of the rings around the ray of a light, mm.
     ring_taps_mm: vec4f,
     ring_ends_mm: vec4f,
