@@ -100,7 +100,7 @@ fn lining(
     (*surface).spread_mm = LINING_SPREAD_MM;
     // Light falls in over the lower lip; deep, but never black, as red light is passed on from wall to wall.
     let cover = lip_cover((*surface).position, 14.0);
-    let entering = exp(-cover.y / 9.0) * (1.0 - 0.6 * exp(-cover.x / 2.5));
+    let entering = exp(-cover.y / 7.0) * (1.0 - 0.6 * exp(-cover.x / 2.5));
     let depth = (*surface).occlusion * (*surface).occlusion * (*surface).occlusion;
     (*surface).occlusion = max(depth, mix(0.06, 0.36, entering));
     // Vessels under a thin wet skin, in patches; the tongue wears a pale coat of papillae.
@@ -112,7 +112,7 @@ fn lining(
         let pixel = LINING_CELLS * max(length(duv_dx), length(duv_dy));
         let fine = clamp(1.2 - pixel, 0.0, 1.0);
         let papillae = eye_noise(at) - 0.5;
-        color = mix(vec3f(0.44, 0.16, 0.145), vec3f(0.50, 0.27, 0.235), clamp(0.4 + 0.5 * patches, 0.0, 1.0));
+        color = mix(vec3f(0.36, 0.105, 0.100), vec3f(0.39, 0.175, 0.155), clamp(0.4 + 0.5 * patches, 0.0, 1.0));
         color *= 1.0 + 0.3 * fine * papillae;
         bump += 0.55 * fine * vec2f(eye_noise(at + vec2f(0.7, 0.0)) - papillae - 0.5, eye_noise(at + vec2f(0.0, 0.7)) - papillae - 0.5);
     }
