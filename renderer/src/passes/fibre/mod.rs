@@ -14,8 +14,8 @@
 //!
 //! - mirrored off the cuticle: N = cos(phi / 2) / 4, A = Fresnel. Scales lean towards the tip, so light leaves nearer to
 //!   the root's side than a mirror sends it, and the highlight on a head stands nearer to the tips;
-//! - through the fibre (of which 0.15 is seen, as cropped hair lies on more hair), and returned off its far side: shifted half as far and twice as far the other way, as Marschner
-//!   found, and coloured by absorption along the way inside;
+//! - through the fibre (of which 0.15 is seen, as cropped hair lies on more hair), and returned off its far side: shifted
+//!   half as far and twice as far the other way, as Marschner found, and coloured by absorption along the way inside;
 //! - what other hairs pass on: a Lambertian cylinder (Kajiya and Kay 1989, with the half of it that the light reaches).
 //!
 //! M is a Gaussian in the sum of sines and the lobes' azimuths are exponentials of its cosine (B. Karis 2016, "Physically

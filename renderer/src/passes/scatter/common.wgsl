@@ -8,6 +8,8 @@ const NOTHING_MM = 1e8;
 const NO_SKIN_MM = 4000.0;
 // Depth change for a millimetre across beyond which two neighbours are taken for two surfaces (76 degrees).
 const MAX_SLOPE = 4.0;
+// Depth that pixels of one surface may differ by where they are taken together as a texel of a smaller image.
+const ONE_SURFACE_MM = 4.0;
 // Radius of a kernel in pixels above which positions would leave the range of integers.
 const MAX_REACH = 1e6;
 const HALF_MAX = 65504.0;

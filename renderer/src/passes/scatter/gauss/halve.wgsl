@@ -6,8 +6,6 @@
 @group(0) @binding(2) var quarter: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(3) var eighth: texture_storage_2d<rgba16float, write>;
 
-// Texels as near to the nearest of four as this are of its surface.
-const ONE_SURFACE_MM = 4.0;
 const SIDE = 16u;
 
 // What the workgroup made last, row by row.

@@ -35,8 +35,6 @@ const PLANE_MM = 0.1;
 const CURVATURE_PER_MM = 0.02;
 // One that is farther than this has nothing of skin.
 const ALL_FAR_MM = 0.99 * FAR_MM;
-// Depth that the pixels of one texel of a level may differ by.
-const ONE_SURFACE_MM = 4.0;
 
 const THREADS = 128u;
 // A workgroup does 4 x 1 blocks of 8 x 8 pixels.
