@@ -4,17 +4,14 @@
 //! Prints what the device's timestamps say of the pass and the wall clock of a whole frame of 16 x 16 pixels: a software
 //! device stamps when it takes work in, not when it does it.
 
-use std::sync::Arc;
-
 use glam::{Mat4, Vec2, Vec3};
-use rubor_renderer::{
-    AppearanceMethods, Camera, ColorTable, Gpu, HeadInstance, HeadOnGpu, RenderError, Renderer,
-    ScatterMethod, Scene, Settings, TransmitMethod, antialias,
+use rubor_renderer::settings::{
+    AntialiasMethod, Look, Output, Quality, ScatterMethod, Settings, TransmitMethod,
 };
+use rubor_renderer::{Camera, ColorTable, Gpu, HeadInstance, HeadOnGpu, RenderError, Renderer, Scene};
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
 use rubor_rig::map::Map;
-use rubor_rig::skin::profile::Profile;
 
 const FRAMES: usize = 21;
 
@@ -58,15 +55,15 @@ fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<[
         background_linear: Vec3::ZERO,
     };
     let settings = Settings {
-        size: [16, 16],
-        scatter: ScatterMethod::None,
-        transmit: TransmitMethod::None,
-        appearance: AppearanceMethods::default(),
-        profile: Arc::new(Profile::deon_six()),
-        antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
-        supersampling: 1,
-        shadow_size: 16,
-        exposure: 1.0,
+        output: Output { size: [16, 16], ..Output::default() },
+        quality: Quality {
+            scatter: ScatterMethod::None,
+            transmit: TransmitMethod::None,
+            antialias: AntialiasMethod::None,
+            shadow_size: 16,
+            ..Quality::default()
+        },
+        look: Look::default(),
     };
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     for _ in 0..FRAMES {

@@ -43,6 +43,12 @@ pub enum RenderError {
     /// The diffusion profile or a kernel of it is out of range.
     #[error(transparent)]
     Skin(#[from] rubor_rig::error::SkinError),
+    /// A setting out of range.
+    #[error(transparent)]
+    Settings(#[from] crate::settings::SettingsError),
+    /// A method that the table does not have, or its number out of range.
+    #[error(transparent)]
+    Method(#[from] crate::settings::UnknownMethod),
     /// The device stopped answering or ran out of memory.
     #[error("the device failed: {0}")]
     Lost(String),

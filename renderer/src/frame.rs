@@ -11,7 +11,7 @@ use crate::gpu::Gpu;
 use crate::head::{GpuVertex, HeadOnGpu};
 use crate::pass_timer::{FrameLog, FrameTimes, PassTimer};
 use crate::passes::antialias::{self, Antialias, History};
-use crate::passes::appearance::{Appearance, AppearanceMethods, Blended, ColorMethod};
+use crate::passes::appearance::{Appearance, Blended};
 use crate::passes::compose::Compose;
 use crate::passes::cropped_hair::CroppedHair;
 use crate::passes::display::Display;
@@ -19,8 +19,8 @@ use crate::passes::fibre::Fibre;
 use crate::passes::morph::Morph;
 use crate::passes::overlay::{Overlaid, Overlay};
 use crate::passes::scatter::surface::{self, Skin, Surface};
-use crate::passes::scatter::{Images, Recorder, Scatter, ScatterMethod};
-use crate::passes::shade::{Lighting, Shade, Shaded, TransmitMethod, Transmittance};
+use crate::passes::scatter::{Images, Recorder, Scatter};
+use crate::passes::shade::{Lighting, Shade, Shaded, Transmittance};
 use crate::passes::shadow::Shadow;
 use crate::passes::surface_frames::{FRAME_BYTES, SurfaceFrames};
 use crate::passes::velocity::{Moving, Velocity};
@@ -29,30 +29,8 @@ use crate::placement::{
     PICTURE_MARGIN, average_light, lamps, pixels_per_mm, place_lights, receivers, view, world_from_head,
 };
 use crate::scene::{MAX_HEADS, MAX_LIGHTS, Scene};
+use crate::settings::{ColorMethod, Quality, ScatterMethod, Settings, TransmitMethod};
 use crate::targets::Targets;
-
-/// How frames are made.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// Pixels of the image.
-    pub size: [u32; 2],
-    /// How light scatters in skin.
-    pub scatter: ScatterMethod,
-    /// How light passes through thin parts.
-    pub transmit: TransmitMethod,
-    /// How colour and wrinkles of the moment are drawn.
-    pub appearance: AppearanceMethods,
-    /// How far light goes in skin, for every method.
-    pub profile: Arc<Profile>,
-    /// Antialiasing of the displayed image.
-    pub antialias: antialias::Settings,
-    /// Pixels of the frame on a side of a pixel of the image (1 to 8): `ssaa`.
-    pub supersampling: u32,
-    /// Texels on a side of a shadow map.
-    pub shadow_size: u32,
-    /// Factor of radiance before the tone map.
-    pub exposure: f32,
-}
 
 /// An image of the frame, rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -145,13 +123,6 @@ struct Instance {
     blended: Blended,
 }
 
-impl Settings {
-    /// Pixels that the passes before display draw.
-    pub(crate) fn frame_size(&self) -> [u32; 2] {
-        self.size.map(|n| n * self.supersampling)
-    }
-}
-
 impl Renderer {
     /// Compiles the passes.
     ///
@@ -223,7 +194,7 @@ impl Renderer {
                 .sum(),
             memory_bytes: self.memory_bytes(scene),
         };
-        Ok((Image { width: settings.size[0], height: settings.size[1], rgba }, stats))
+        Ok((Image { width: settings.output.size[0], height: settings.output.size[1], rgba }, stats))
     }
 
     /// Draws a scene `frames` times, one frame right after the other and without reading any picture, and says what each
@@ -238,10 +209,10 @@ impl Renderer {
         warm_up: u32,
         frames: u32,
     ) -> Result<Vec<FrameTimes>, RenderError> {
-        if let ScatterMethod::ReferenceSurface(_) = settings.scatter {
+        if let ScatterMethod::ReferenceSurface(_) = settings.quality.scatter {
             return Err(RenderError::Limit {
                 what: "method to measure",
-                found: settings.scatter.to_string(),
+                found: settings.quality.scatter.to_string(),
                 expected: "one that draws a frame in one go".into(),
             });
         }
@@ -280,25 +251,26 @@ impl Renderer {
             self.antialias = None;
             self.past = Past { frames: self.past.frames, ..Past::default() };
         }
-        if settings.antialias.mode == antialias::Mode::None {
+        if settings.antialias().mode == antialias::Mode::None {
             self.antialias = None;
-        } else if self.antialias.as_ref().is_none_or(|a| *a.settings() != settings.antialias) {
+        } else if self.antialias.as_ref().is_none_or(|a| *a.settings() != settings.antialias()) {
             let format = wgpu::TextureFormat::Rgba8Unorm;
-            self.antialias = Some(Antialias::new(&self.gpu, &settings.antialias, settings.size, format)?);
+            self.antialias =
+                Some(Antialias::new(&self.gpu, &settings.antialias(), settings.output.size, format)?);
         }
         self.fit_instances(scene);
-        self.scatter.prepare(&self.gpu, settings.scatter, &settings.profile)?;
-        if settings.transmit == TransmitMethod::ShadowDepth
-            && self.transmittance.as_ref().is_none_or(|(p, _)| *p != settings.profile)
+        self.scatter.prepare(&self.gpu, settings.quality.scatter, settings.quality.profile.shared())?;
+        if settings.quality.transmit == TransmitMethod::ShadowDepth
+            && self.transmittance.as_ref().is_none_or(|(p, _)| *p != *settings.quality.profile.shared())
         {
-            let table = Transmittance::new(&self.gpu, &settings.profile)?;
-            self.transmittance = Some((settings.profile.clone(), table));
+            let table = Transmittance::new(&self.gpu, settings.quality.profile.shared())?;
+            self.transmittance = Some((settings.quality.profile.shared().clone(), table));
         }
-        self.shade.prepare_specular(&self.gpu, settings.appearance.specular);
-        if matches!(settings.scatter, ScatterMethod::ReferenceSurface(_)) {
+        self.shade.prepare_specular(&self.gpu, settings.quality.specular);
+        if matches!(settings.quality.scatter, ScatterMethod::ReferenceSurface(_)) {
             self.shade.prepare_samples(&self.gpu);
         }
-        self.is_scattered = settings.scatter != ScatterMethod::None;
+        self.is_scattered = settings.quality.scatter != ScatterMethod::None;
         Ok(())
     }
 
@@ -393,21 +365,23 @@ impl Renderer {
     fn check(&self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
         let limit = |what, found: String, expected: String| Err(RenderError::Limit { what, found, expected });
         let most = self.gpu.device.limits().max_texture_dimension_2d;
-        let [w, h] = settings.size;
+        let [w, h] = settings.output.size;
         if w == 0 || h == 0 || w > most || h > most {
             let expected = format!("1x1 to {most}x{most} on {}", self.gpu.info.name);
             return limit("image size", format!("{w}x{h}"), expected);
         }
-        let n = settings.supersampling;
-        if n == 0 || n > 8 || w * n > most || h * n > most {
+        settings.validate()?;
+        let n = settings.samples_per_side();
+        if n == 0 || n > 64 || w * n > most || h * n > most {
             let expected = format!("1 to 8, and a frame of at most {most} pixels on a side");
             return limit("supersampling", n.to_string(), expected);
         }
-        if settings.shadow_size < 16 || settings.shadow_size > most {
-            return limit("shadow map size", settings.shadow_size.to_string(), format!("16 to {most}"));
-        }
-        if !settings.exposure.is_finite() || settings.exposure < 0.0 {
-            return limit("exposure", settings.exposure.to_string(), "0 or more".into());
+        if settings.quality.shadow_size < 16 || settings.quality.shadow_size > most {
+            return limit(
+                "shadow map size",
+                settings.quality.shadow_size.to_string(),
+                format!("16 to {most}"),
+            );
         }
         if scene.heads.len() > MAX_HEADS {
             return limit("number of heads", scene.heads.len().to_string(), format!("at most {MAX_HEADS}"));
@@ -484,7 +458,7 @@ impl Renderer {
         let (gpu, timer) = (&self.gpu, &mut self.timer);
         let Some(targets) = &self.targets else { return Ok(None) };
         let mut scatter_noise = None;
-        let transmittance = match (settings.transmit, settings.scatter) {
+        let transmittance = match (settings.quality.transmit, settings.quality.scatter) {
             // The integral over the surface holds the light from behind.
             (TransmitMethod::None, _) | (_, ScatterMethod::ReferenceSurface(_)) => None,
             (TransmitMethod::ShadowDepth, _) => self.transmittance.as_ref().map(|(_, t)| t),
@@ -501,7 +475,7 @@ impl Renderer {
             self.surface_frames.record(gpu, encoder, timer, head, &buffers.positions, &buffers.frames);
             if let Some(maps) = &head.maps {
                 let state = instance.state;
-                let distributions: &[f32] = match settings.appearance.color {
+                let distributions: &[f32] = match settings.quality.color {
                     ColorMethod::Static => &[],
                     ColorMethod::Hemoglobin => &state.distributions,
                 };
@@ -517,7 +491,7 @@ impl Renderer {
         }
         let shadows = crate::texture::array_view_of(&targets.shadows);
 
-        let subsamples = settings.antialias.mode.subsamples(self.past.frames);
+        let subsamples = settings.antialias().mode.subsamples(self.past.frames);
         let share = 1.0 / subsamples.len() as f32;
         let shading_jitter = subsamples
             .iter()
@@ -545,7 +519,7 @@ impl Renderer {
             };
             let outputs = [&targets.irradiance, &targets.albedo, &targets.direct];
             for (index, (instance, (head, buffers))) in scene.heads.iter().zip(&heads).enumerate() {
-                let shaded = shaded(index, instance, head, buffers, settings.appearance);
+                let shaded = shaded(index, instance, head, buffers, &settings.quality);
                 self.shade.record(gpu, encoder, timer, &lighting, &shaded, outputs);
             }
 
@@ -556,9 +530,9 @@ impl Renderer {
                 scratch: &targets.scratch,
                 scattered: &targets.scattered,
             };
-            let diffuse = match settings.scatter {
+            let diffuse = match settings.quality.scatter {
                 ScatterMethod::ReferenceSurface(batches) => {
-                    let integral = Surface::new(gpu, &settings.profile, targets.size);
+                    let integral = Surface::new(gpu, settings.quality.profile.shared(), targets.size);
                     let inputs = surface::Inputs {
                         view: &view,
                         ids: &sample.ids,
@@ -570,7 +544,7 @@ impl Renderer {
                     // The sums need the light of this frame: the device works on it while samples are drawn.
                     let fresh = gpu.device.create_command_encoder(&Default::default());
                     gpu.queue.submit([std::mem::replace(encoder, fresh).finish()]);
-                    let appearance = settings.appearance;
+                    let appearance = &settings.quality;
                     integrate(
                         gpu,
                         &self.shade,
@@ -639,7 +613,7 @@ impl Renderer {
                 self.overlay.record(gpu, encoder, timer, light, ambient, &overlays, &targets.hdr, velocity);
             }
 
-            let (exposure, samples) = (settings.exposure, settings.supersampling);
+            let (exposure, samples) = (settings.look.exposure, settings.samples_per_side());
             self.display.record(gpu, encoder, timer, exposure, samples, &targets.hdr, &sample.displayed);
         }
 
@@ -648,14 +622,14 @@ impl Renderer {
             let depths: Vec<_> = targets.samples.iter().map(|s| &s.depth).collect();
             let inputs = antialias::Inputs {
                 colors: &colors,
-                depths: if settings.antialias.needs_depth() { &depths } else { &[] },
+                depths: if settings.antialias().needs_depth() { &depths } else { &[] },
                 velocity: targets.velocity.as_ref(),
                 frame: self.past.frames,
             };
             let image = targets.image.create_view(&Default::default());
-            let is_temporal = settings.antialias.mode.is_temporal();
+            let is_temporal = settings.quality.antialias.is_temporal();
             if is_temporal && self.past.history.is_none() {
-                self.past.history = Some(History::new(gpu, settings.size));
+                self.past.history = Some(History::new(gpu, settings.output.size));
             }
             let history = if is_temporal { self.past.history.as_mut() } else { None };
             antialias.record(gpu, encoder, timer, &inputs, &image, history)?;
@@ -684,7 +658,7 @@ fn integrate(
     lighting: &Lighting<'_>,
     integral: &Surface,
     inputs: &surface::Inputs<'_>,
-    appearance: AppearanceMethods,
+    appearance: &Quality,
     batches: u32,
 ) -> Result<(), RenderError> {
     let size = inputs.scattered.texture().size();
@@ -712,7 +686,7 @@ fn shaded<'a>(
     instance: &crate::scene::HeadInstance<'_>,
     head: &'a HeadOnGpu,
     buffers: &'a Instance,
-    appearance: AppearanceMethods,
+    appearance: &Quality,
 ) -> Shaded<'a> {
     Shaded {
         index: index as u32,

@@ -17,6 +17,7 @@
 //! # Ok::<(), rubor_renderer::RenderError>(())
 //! ```
 
+pub mod channels;
 mod clusters;
 mod environment;
 mod error;
@@ -28,6 +29,7 @@ mod pass_timer;
 mod passes;
 mod placement;
 mod scene;
+pub mod settings;
 mod targets;
 #[cfg(test)]
 mod testing;
@@ -37,15 +39,12 @@ mod texture;
 
 pub use environment::{Environment, EnvironmentMap};
 pub use error::RenderError;
-pub use frame::{FrameStats, Image, Renderer, Settings};
+pub use frame::{FrameStats, Image, Renderer};
 pub use gpu::{AdapterDescription, Gpu, list_adapters};
 pub use head::{
     ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
 };
 pub use pass_timer::{FrameTimes, PassTimer};
 pub use passes::antialias;
-pub use passes::appearance::{AppearanceMethods, ColorMethod, SpecularMethod, WrinkleMethod};
-pub use passes::scatter::ScatterMethod;
 pub use passes::scatter::surface::BARE_SKIN;
-pub use passes::shade::TransmitMethod;
 pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};

@@ -3,11 +3,11 @@
 use glam::{Mat4, Vec3};
 
 use crate::clusters::{self, Sphere, Viewer};
-use crate::frame::{Settings, View};
-use crate::passes::scatter::ScatterMethod;
-use crate::passes::shade::{GpuLight, TransmitMethod};
+use crate::frame::View;
+use crate::passes::shade::GpuLight;
 use crate::passes::shadow::LightView;
 use crate::scene::{Light, LightKind, MAX_LIGHTS, NEAR_METRES, Scene};
+use crate::settings::{ScatterMethod, Settings, TransmitMethod};
 
 /// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
 pub(crate) const PICTURE_MARGIN: f32 = 1.25;
@@ -85,8 +85,8 @@ pub(crate) fn lamps(scene: &Scene<'_>, settings: &Settings) -> Vec<Light> {
         };
         l.casts_shadow && direction.normalize_or_zero().dot(view) < -BEHIND_COSINE
     };
-    let transmits = settings.transmit == TransmitMethod::ShadowDepth
-        && !matches!(settings.scatter, ScatterMethod::ReferenceSurface(_));
+    let transmits = settings.quality.transmit == TransmitMethod::ShadowDepth
+        && !matches!(settings.quality.scatter, ScatterMethod::ReferenceSurface(_));
     if transmits && scene.environment.is_some() && lamps.len() < MAX_LIGHTS && !lamps.iter().any(is_behind) {
         let kind = LightKind::Directional { direction: -view };
         lamps.push(Light { kind, color_linear: Vec3::ZERO, radius: 0.0, casts_shadow: true });
@@ -97,9 +97,9 @@ pub(crate) fn lamps(scene: &Scene<'_>, settings: &Settings) -> Vec<Light> {
 /// Where the heads are lit for a picture: what the camera sees of them, and for the integral over the surface also what
 /// is turned away.
 pub(crate) fn receivers(scene: &Scene<'_>, settings: &Settings) -> Vec<Sphere> {
-    let [width, height] = settings.size;
+    let [width, height] = settings.output.size;
     let clip_from_view = scene.camera.clip_from_view(width as f32 / height as f32);
-    let is_surface = matches!(settings.scatter, ScatterMethod::ReferenceSurface(_));
+    let is_surface = matches!(settings.quality.scatter, ScatterMethod::ReferenceSurface(_));
     let viewer = Viewer {
         position: scene.camera.position,
         clip_from_world: clip_from_view * scene.camera.view_from_world(),

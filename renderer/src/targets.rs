@@ -1,7 +1,7 @@
 //! Images between the passes of a frame.
 
-use crate::frame::Settings;
 use crate::gpu::Gpu;
+use crate::settings::Settings;
 
 /// Images between passes.
 pub(crate) struct Targets {
@@ -38,21 +38,21 @@ impl Targets {
                 .create_view(&Default::default())
         };
         let light = |label| view(label, size, Rgba16Float, storage);
-        let mode = settings.antialias.mode;
+        let mode = settings.antialias().mode;
         let samples = mode
             .subsamples(0)
             .iter()
             .map(|_| SampleTargets {
                 ids: view("ids", size, R32Uint, Use::RENDER_ATTACHMENT),
                 depth: view("depth", size, Depth32Float, Use::RENDER_ATTACHMENT),
-                displayed: view("displayed", settings.size, Rgba8Unorm, storage),
+                displayed: view("displayed", settings.output.size, Rgba8Unorm, storage),
             })
             .collect();
         let shadows = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("shadows"),
             size: wgpu::Extent3d {
-                width: settings.shadow_size,
-                height: settings.shadow_size,
+                width: settings.quality.shadow_size,
+                height: settings.quality.shadow_size,
                 depth_or_array_layers: shadow_layers.max(1),
             },
             mip_level_count: 1,
@@ -70,7 +70,7 @@ impl Targets {
                 .then(|| view("velocity", size, Rgba16Float, storage | Use::RENDER_ATTACHMENT)),
             image: gpu.target(
                 "image",
-                settings.size,
+                settings.output.size,
                 Rgba8Unorm,
                 storage | Use::COPY_SRC | Use::TEXTURE_BINDING,
             ),
@@ -86,12 +86,12 @@ impl Targets {
 
     /// Whether frames with these settings find what they need.
     pub(crate) fn matches(&self, settings: &Settings, shadow_layers: u32) -> bool {
-        let mode = settings.antialias.mode;
+        let mode = settings.antialias().mode;
         self.size == settings.frame_size()
-            && [self.image.width(), self.image.height()] == settings.size
+            && [self.image.width(), self.image.height()] == settings.output.size
             && self.samples.len() == mode.subsamples(0).len()
             && self.velocity.is_some() == mode.is_temporal()
-            && self.shadows.width() == settings.shadow_size
+            && self.shadows.width() == settings.quality.shadow_size
             && self.shadows.depth_or_array_layers() >= shadow_layers
     }
 

@@ -1,7 +1,5 @@
 //! Shaders against Rust, kernels against the CPU, and what every frame keeps to.
 
-use std::sync::Arc;
-
 use glam::{Mat4, Quat, Vec2, Vec3};
 use rubor_rig::deform;
 use rubor_rig::face_state::FaceState;
@@ -9,18 +7,19 @@ use rubor_rig::head::{
     BlendShape, Distribution, Head, Material, Mesh, OcclusionChange, Part, SkinMaps, Vertex, WrinkleZone,
 };
 use rubor_rig::map::Map;
-use rubor_rig::skin::profile::Profile;
 
 use crate::frame::View;
 use crate::head::GpuVertex;
 use crate::passes::{
-    antialias, appearance, compose, display, morph, overlay, shade, shadow, surface_frames, velocity,
-    visibility,
+    appearance, compose, display, morph, overlay, shade, shadow, surface_frames, velocity, visibility,
+};
+use crate::settings::{
+    AntialiasMethod, Look, Output, Quality, ScatterMethod, Settings, SpecularMethod, TransmitMethod,
 };
 use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
 use crate::{
-    AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light,
-    LightKind, RenderError, Renderer, ScatterMethod, Scene, Settings, SpecularMethod, TransmitMethod,
+    Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
+    Renderer, Scene,
 };
 
 #[test]
@@ -171,15 +170,9 @@ pub(crate) fn renderer() -> Option<Renderer> {
 
 pub(crate) fn settings(size: [u32; 2]) -> Settings {
     Settings {
-        size,
-        scatter: ScatterMethod::Separable(17),
-        transmit: TransmitMethod::ShadowDepth,
-        appearance: AppearanceMethods::default(),
-        profile: Arc::new(Profile::deon_six()),
-        antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
-        supersampling: 1,
-        shadow_size: 256,
-        exposure: 1.0,
+        output: Output { size, ..Output::default() },
+        quality: Quality { antialias: AntialiasMethod::None, shadow_size: 256, ..Quality::default() },
+        look: Look { exposure: 1.0, ..Look::default() },
     }
 }
 
@@ -281,12 +274,12 @@ fn an_even_sky_comes_back_as_albedo_and_reflection_and_never_as_more() {
     let head = dome();
     let white = HeadOnGpu::new(renderer.gpu(), &head, &table).expect("the dome uploads");
     let pale = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
-    for specular in SpecularMethod::ALL {
+    for specular in SpecularMethod::all() {
         let mut settings = settings([65, 65]);
-        settings.appearance.specular = *specular;
-        settings.scatter = ScatterMethod::None;
+        settings.quality.specular = specular;
+        settings.quality.scatter = ScatterMethod::None;
         // The dome has no back: a sky behind it would come through.
-        settings.transmit = TransmitMethod::None;
+        settings.quality.transmit = TransmitMethod::None;
         let state = FaceState::neutral(&head);
         let mut light = |head: &HeadOnGpu| -> Vec<f32> {
             draw(&mut renderer, head, &state, &[], &settings).expect("it draws");
@@ -406,10 +399,10 @@ fn wrong_settings_are_answered_in_words() {
         change(&mut s);
         draw(&mut renderer, &on_gpu, state, &[], &s).expect_err("it is refused").to_string()
     };
-    assert!(message(|s| s.size = [0, 16], &state).contains("0x16"));
-    assert!(message(|s| s.size = [1 << 20, 16], &state).contains("1048576x16"));
-    assert!(message(|s| s.supersampling = 0, &state).contains("supersampling"));
-    assert!(message(|s| s.exposure = f32::NAN, &state).contains("exposure"));
+    assert!(message(|s| s.output.size = [0, 16], &state).contains("0x16"));
+    assert!(message(|s| s.output.size = [1 << 20, 16], &state).contains("1048576x16"));
+    assert!(message(|s| s.output.supersampling = 0, &state).contains("supersampling"));
+    assert!(message(|s| s.look.exposure = f32::NAN, &state).contains("exposure"));
     let mut broken = state.clone();
     broken.shapes.pop();
     assert!(message(|_| {}, &broken).contains("shape weights is 1; 2"));

@@ -1,11 +1,14 @@
 //! What to antialias by: modes, presets and every single setting.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use crate::settings::AntialiasMethod;
 
 /// Antialiasing methods of chapters 9 and 10, by the names that files and the command use. Supersampling
 /// (`ssaa:N`) belongs to the frame, since it draws more pixels instead of filtering them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
-#[serde(rename_all = "kebab-case")]
+#[serde(from = "AntialiasMethod", into = "AntialiasMethod")]
 pub enum Mode {
     /// The image is copied.
     None,
@@ -13,16 +16,12 @@ pub enum Mode {
     Mlaa,
     /// One sample a pixel.
     #[default]
-    #[serde(rename = "smaa-1x")]
     Smaa1x,
     /// Two samples a pixel, each filtered for its own place in the pixel.
-    #[serde(rename = "smaa-s2x")]
     SmaaS2x,
     /// One sample a pixel at alternating places and the reprojected previous frame.
-    #[serde(rename = "smaa-t2x")]
     SmaaT2x,
     /// Two samples a pixel at alternating places and the reprojected previous frame.
-    #[serde(rename = "smaa-4x")]
     Smaa4x,
 }
 
@@ -62,14 +61,7 @@ impl Mode {
 
     /// The name in files and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Mlaa => "mlaa",
-            Self::Smaa1x => "smaa-1x",
-            Self::SmaaS2x => "smaa-s2x",
-            Self::SmaaT2x => "smaa-t2x",
-            Self::Smaa4x => "smaa-4x",
-        }
+        AntialiasMethod::from(self).name()
     }
 
     /// The samples that frame number `frame` has to be drawn with, in the order in which `record` wants them.
@@ -86,6 +78,33 @@ impl Mode {
     /// Whether the mode needs velocities and the previous frame.
     pub fn is_temporal(self) -> bool {
         matches!(self, Self::SmaaT2x | Self::Smaa4x)
+    }
+}
+
+impl From<Mode> for AntialiasMethod {
+    fn from(mode: Mode) -> Self {
+        match mode {
+            Mode::None => Self::None,
+            Mode::Mlaa => Self::Mlaa,
+            Mode::Smaa1x => Self::Smaa1x,
+            Mode::SmaaS2x => Self::SmaaS2x,
+            Mode::SmaaT2x => Self::SmaaT2x,
+            Mode::Smaa4x => Self::Smaa4x,
+        }
+    }
+}
+
+impl From<AntialiasMethod> for Mode {
+    /// Supersampling leaves nothing to filter.
+    fn from(method: AntialiasMethod) -> Self {
+        match method {
+            AntialiasMethod::None | AntialiasMethod::Ssaa(_) => Self::None,
+            AntialiasMethod::Mlaa => Self::Mlaa,
+            AntialiasMethod::Smaa1x => Self::Smaa1x,
+            AntialiasMethod::SmaaS2x => Self::SmaaS2x,
+            AntialiasMethod::SmaaT2x => Self::SmaaT2x,
+            AntialiasMethod::Smaa4x => Self::Smaa4x,
+        }
     }
 }
 
@@ -136,7 +155,7 @@ pub enum Alpha {
 }
 
 /// Which patterns of edges stand for which contours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Patterns {
     /// The same for images however they are turned or mirrored, and closer to the contours:
@@ -169,7 +188,7 @@ impl Default for Predication {
 }
 
 /// Quality of SMAA as published: threshold, search steps of two pixels, diagonal steps, corner rounding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
     /// 0.15, 4 steps, no diagonals, no corners.

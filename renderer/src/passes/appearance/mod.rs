@@ -14,10 +14,6 @@
 //!
 //! Does not: clamp hemoglobin to its physical range (that needs `H_n`: see `shade`).
 
-mod method;
-
-pub use method::{AppearanceMethods, ColorMethod, SpecularMethod, WrinkleMethod};
-
 use crate::gpu::Gpu;
 use crate::head::{APPEARANCE_SIZE, MAX_DISTRIBUTIONS, MAX_ZONES, MapsOnGpu};
 use crate::pass_timer::PassTimer;

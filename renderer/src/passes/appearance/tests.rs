@@ -5,7 +5,7 @@ use rubor_rig::head::{Distribution, Head, WrinkleZone};
 use rubor_rig::hemoglobin::blend_texel;
 use rubor_rig::map::Map;
 
-use super::{ColorMethod, WrinkleMethod};
+use crate::settings::{ColorMethod, WrinkleMethod};
 use crate::tests::{WHITE_TABLE, dome, draw, lamp, renderer, settings};
 use crate::{ColorTable, HeadOnGpu, MAX_HEMOGLOBIN, MAX_WRINKLE_MAPS, Renderer, footprint};
 
@@ -98,7 +98,7 @@ fn neutral_weights_and_static_colour_are_the_neutral_map_bit_for_bit() {
     flushed.hemoglobin_scale = 1.27;
     assert_ne!(blood(&mut renderer, &on_gpu, &flushed).1, expected);
     let mut still = settings([SIZE as u32; 2]);
-    still.appearance.color = ColorMethod::Static;
+    still.quality.color = ColorMethod::Static;
     draw(&mut renderer, &on_gpu, &flushed, &[], &still).expect("it draws");
     assert_eq!(renderer.read_albedo().expect("albedo comes back"), expected);
 }
@@ -145,7 +145,7 @@ fn both_wrinkle_encodings_agree_where_slopes_are_small() {
         let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
         let state = FaceState { zones: vec![weight], ..FaceState::neutral(&head) };
         let mut s = settings([48, 48]);
-        s.appearance.wrinkles = method;
+        s.quality.wrinkles = method;
         draw(&mut renderer, &on_gpu, &state, &[lamp()], &s).expect("it draws").rgba
     };
     let largest = |a: &[u8], b: &[u8]| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max();

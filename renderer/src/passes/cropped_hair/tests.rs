@@ -4,7 +4,7 @@ use rubor_rig::head::{Material, Part, Vertex};
 use rubor_rig::map::Map;
 
 use super::*;
-use crate::passes::antialias;
+use crate::settings::AntialiasMethod;
 use crate::testing::{assert_layout, offsets, validated_workgroups};
 use crate::tests::{WHITE_TABLE, dome, lamp, renderer, settings};
 use crate::{Camera, HeadInstance, HeadOnGpu, Scene};
@@ -88,7 +88,7 @@ fn a_hair_moves_with_its_root() {
     let fov_degrees = 2.0 * (0.0105f32 / distance).atan().to_degrees();
     let pixels_per_metre = size as f32 / 0.021;
     let mut settings = settings([size; 2]);
-    settings.antialias = antialias::Settings::new(antialias::Mode::SmaaT2x, antialias::Preset::High);
+    settings.quality.antialias = AntialiasMethod::SmaaT2x;
     // The head nods sideways about the axis of the camera; the edge stands still but for that.
     let turn = 0.002f32;
     for angle in [0.0, turn] {

@@ -20,6 +20,7 @@ use rubor_rig::skin::profile::Profile;
 use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::pass_timer::PassTimer;
+use crate::settings::ScatterMethod;
 
 pub(crate) mod disk;
 pub(crate) mod exact;
@@ -27,7 +28,6 @@ pub(crate) mod gather;
 pub(crate) mod gauss;
 pub(crate) mod jitter;
 pub(crate) mod line;
-mod method;
 pub(crate) mod separable;
 pub(crate) mod surface;
 
@@ -35,8 +35,6 @@ pub(crate) mod surface;
 mod reference;
 #[cfg(test)]
 mod tests;
-
-pub use method::ScatterMethod;
 
 /// Share of a neighbour that is given back to the centre for each millimetre that it is off the centre's tangent plane.
 /// A step of 4 mm (lip over teeth, wing of the nose over cheek) separates fully; the curve of a cheek does not.

@@ -55,9 +55,6 @@ pub(crate) mod directional_albedo;
 #[cfg(test)]
 mod tests;
 
-use std::fmt;
-use std::str::FromStr;
-
 use glam::{Mat4, Vec3, Vec4};
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::skin::transmittance::TransmittanceTable;
@@ -67,9 +64,10 @@ use crate::error::RenderError;
 use crate::gpu::Gpu;
 use crate::head::HeadOnGpu;
 use crate::pass_timer::PassTimer;
-use crate::passes::appearance::{Blended, SpecularMethod, WrinkleMethod};
+use crate::passes::appearance::Blended;
 use crate::passes::shadow::LightView;
 use crate::scene::{Light, LightKind, MAX_LIGHTS};
+use crate::settings::{SpecularMethod, WrinkleMethod};
 
 /// WGSL of the pass.
 pub(crate) const SHADER: &str = concat!(
@@ -95,40 +93,6 @@ pub(crate) const SAMPLES_SHADER: &str = concat!(
     include_str!("micro.wgsl"),
     include_str!("light_samples.wgsl")
 );
-
-/// How light passes through thin parts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TransmitMethod {
-    /// `none`: it does not.
-    None,
-    /// `shadow-depth`: thickness from shadow maps, light from T(s) (Jimenez et al. 2010; papers/004 ch. 5).
-    ShadowDepth,
-}
-
-impl fmt::Display for TransmitMethod {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::None => "none",
-            Self::ShadowDepth => "shadow-depth",
-        })
-    }
-}
-
-impl FromStr for TransmitMethod {
-    type Err = RenderError;
-
-    fn from_str(text: &str) -> Result<Self, RenderError> {
-        match text {
-            "none" => Ok(Self::None),
-            "shadow-depth" => Ok(Self::ShadowDepth),
-            _ => Err(RenderError::Limit {
-                what: "transmittance",
-                found: text.into(),
-                expected: "expected none or shadow-depth".into(),
-            }),
-        }
-    }
-}
 
 /// Entries of T(s): a step of 0.03 mm for skin.
 const TRANSMITTANCE_ENTRIES: usize = 256;
@@ -291,6 +255,20 @@ pub(crate) struct Shaded<'a> {
     pub(crate) world_from_head: Mat4,
 }
 
+impl SpecularMethod {
+    /// Factors of the map's roughness of a first and a second lobe, and the share of the second. Skin has slopes at
+    /// scales from cells to furrows, and measured patches fit two lobes better than one (Graham et al. 2013,
+    /// "Measurement-based synthesis of facial microgeometry"); the factors were chosen by eye on cheek and forehead and
+    /// keep the mean square slope.
+    pub(crate) fn lobes(self) -> [f32; 3] {
+        match self {
+            Self::OneLobe => [1.0, 1.0, 0.0],
+            // 0.72^2 (1 - 0.278) + 1.5^2 0.278 = 1.
+            Self::TwoLobes => [0.72, 1.5, 0.278],
+        }
+    }
+}
+
 /// The pipeline of the pass.
 pub(crate) struct Shade {
     pipeline: wgpu::ComputePipeline,
@@ -314,7 +292,7 @@ impl Shade {
         };
         let sampler = |d: &wgpu::SamplerDescriptor<'_>| gpu.device.create_sampler(d);
         let black = crate::texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]);
-        let specular = SpecularMethod::default();
+        let specular = SpecularMethod::OneLobe;
         Self {
             directional_albedo: (specular, upload_directional_albedo(gpu, specular)),
             pipeline: gpu.compute_pipeline("shade", SHADER, "shade"),

@@ -60,7 +60,7 @@ fn row(renderer: &mut Renderer, material: Material, has_flap: bool) -> Vec<f32> 
         background_linear: Vec3::ZERO,
     };
     let mut settings = settings([SIZE; 2]);
-    settings.shadow_size = 1024;
+    settings.quality.shadow_size = 1024;
     renderer.render(&scene, &settings).expect("it draws");
     let hdr = renderer.read_hdr().expect("light comes back");
     (0..SIZE).map(|x| hdr[(SIZE / 2 * SIZE + x) as usize][1]).collect()
@@ -88,4 +88,13 @@ fn light_spreads_in_teeth_and_not_in_what_is_opaque() {
     assert!((1.0..2.6).contains(&soft_mm), "a disc of 1.3 mm about each place: {soft_mm} mm");
     // The shadow lies where it did.
     assert!((hard_at - 3.0).abs() < 0.25 && (soft_at - hard_at).abs() < 0.35, "{hard_at} and {soft_at}");
+}
+
+#[test]
+fn lobes_keep_the_mean_square_slope() {
+    for method in crate::settings::SpecularMethod::all() {
+        let [first, second, share] = method.lobes();
+        let square = (1.0 - share) * first * first + share * second * second;
+        assert!((square - 1.0).abs() < 2e-3, "{method} keeps the mean square slope: {square}");
+    }
 }

@@ -1,18 +1,16 @@
 //! Analytic cases: the integral over a plane, and transmittance through a wedge.
 
-use std::sync::Arc;
-
 use glam::{Mat4, Vec2, Vec3};
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Head, Material, Mesh, Part, Vertex};
 use rubor_rig::skin::profile::Profile;
 
-use crate::passes::antialias;
 use crate::passes::shade::directional_albedo::entering;
+use crate::settings::{AntialiasMethod, Look, Output, Quality, ScatterMethod, Settings, TransmitMethod};
 use crate::testing::gpu;
 use crate::{
     Camera, ColorTable, EnvironmentMap, FrameStats, Gpu, HeadInstance, HeadOnGpu, Light, LightKind, Renderer,
-    ScatterMethod, Scene, Settings, TransmitMethod,
+    Scene,
 };
 
 const MM: f32 = 1e-3;
@@ -79,15 +77,9 @@ fn draw(
         background_linear: Vec3::ZERO,
     };
     let settings = Settings {
-        size: [pixels; 2],
-        scatter,
-        transmit,
-        appearance: Default::default(),
-        profile: Arc::new(Profile::deon_six()),
-        antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
-        supersampling: 1,
-        shadow_size: 2048,
-        exposure: 1.0,
+        output: Output { size: [pixels; 2], ..Output::default() },
+        quality: Quality { scatter, transmit, antialias: AntialiasMethod::None, ..Quality::default() },
+        look: Look { exposure: 1.0, ..Look::default() },
     };
     let (_, stats) = renderer.render(&scene, &settings).unwrap();
     Some((renderer.read_diffuse().unwrap(), stats))

@@ -1,0 +1,311 @@
+//! How frames are made, as one value: [`Settings`] = [`Output`] + [`Quality`] + [`Look`].
+//!
+//! ```text
+//! defaults, presets, JSON, flags --overlay--> Settings --validate--> a frame
+//! Settings --schema, leaves--> JSON schema, command flags, documentation
+//! ```
+//!
+//! This is the only definition of a setting. Its documentation comments are the help of the flags, its schema gives
+//! their ranges, and `job.json` and `stats.json` hold the value itself. Methods and their names are in [`methods`].
+//!
+//! ```
+//! use rubor_renderer::settings::{Preset, Settings};
+//! let mut settings = Settings::default();
+//! settings.overlay(&serde_json::json!({ "quality": { "scatter": "burley-disk:16" }, "output": { "size": [64, 64] } }))?;
+//! assert_eq!(settings.quality.scatter.to_string(), "burley-disk:16");
+//! assert_eq!(Preset::Draft.quality().scatter.name(), "separable");
+//! # Ok::<(), rubor_renderer::settings::SettingsError>(())
+//! ```
+
+mod leaves;
+pub mod methods;
+mod profile;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::channels::Channel;
+pub use leaves::{Leaf, leaves};
+pub use methods::{
+    AntialiasMethod, ColorMethod, GROUPS, Group, Method, ScatterMethod, SpecularMethod, Stage, ToneMap,
+    TransmitMethod, UnknownMethod, WrinkleMethod,
+};
+pub use profile::DiffusionProfile;
+
+use crate::passes::antialias;
+
+/// How frames are made.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "camelCase")]
+#[schemars(title = "rubor settings", inline)]
+pub struct Settings {
+    /// What comes out.
+    pub output: Output,
+    /// How well and how fast.
+    pub quality: Quality,
+    /// How the light becomes a picture.
+    pub look: Look,
+}
+
+/// What comes out of a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "camelCase")]
+#[schemars(inline)]
+pub struct Output {
+    /// Width and height of the picture in pixels
+    #[schemars(extend("x-flag" = "WxH"))]
+    pub size: [u32; 2],
+    /// Samples on a side of a pixel that are drawn and averaged before antialiasing; multiplies those of ssaa:N
+    #[schemars(range(min = 1, max = 8))]
+    pub supersampling: u32,
+    /// Further images that the frame keeps, by name
+    pub channels: Vec<Channel>,
+}
+
+/// How well and how fast a frame is made: a choice of each group of methods, and their numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "camelCase")]
+#[schemars(inline)]
+pub struct Quality {
+    /// How light scatters in skin
+    pub scatter: ScatterMethod,
+    /// How light passes through thin parts
+    pub transmit: TransmitMethod,
+    /// Whether the blood of a face moves
+    pub color: ColorMethod,
+    /// How wrinkles join the relief of the skin
+    pub wrinkles: WrinkleMethod,
+    /// The highlight of skin
+    pub specular: SpecularMethod,
+    /// Antialiasing of the displayed picture
+    pub antialias: AntialiasMethod,
+    /// Thresholds and search lengths of the antialiasing
+    pub antialias_preset: antialias::Preset,
+    /// Which patterns of edges stand for which contours; published is for comparisons with the published tables
+    pub antialias_patterns: antialias::Patterns,
+    /// How far light goes in skin, for every scattering method
+    pub profile: DiffusionProfile,
+    /// Texels on a side of a shadow map
+    #[schemars(range(min = 16, max = 16384))]
+    pub shadow_size: u32,
+}
+
+/// How the light of a frame becomes a picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields, rename_all = "camelCase")]
+#[schemars(inline)]
+pub struct Look {
+    /// Factor of the light before the tone map
+    #[schemars(range(min = 0, max = 1e6))]
+    pub exposure: f32,
+    /// From radiance to the brightness of a display
+    pub tone_map: ToneMap,
+}
+
+/// Qualities by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// For trying things out: cheap scattering, small shadow maps, no light through thin parts.
+    Draft,
+    /// For looking at a performance: the default.
+    Review,
+    /// For pictures that are kept: more taps, sixteen samples per pixel.
+    Final,
+    /// As exact as time allows: the integral over the surface.
+    Reference,
+}
+
+/// Settings that a frame cannot be made with.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SettingsError {
+    /// A value is outside of its range.
+    #[error("{setting}: found {found}, expected {expected}")]
+    Range {
+        /// Its path, such as `output.supersampling`.
+        setting: String,
+        /// Its value.
+        found: String,
+        /// The range.
+        expected: String,
+    },
+    /// A field or a value has no such name or type.
+    #[error("{0}")]
+    Json(String),
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self { size: [640, 640], supersampling: 1, channels: Vec::new() }
+    }
+}
+
+impl Default for Quality {
+    fn default() -> Self {
+        Self {
+            scatter: ScatterMethod::Separable(17),
+            transmit: TransmitMethod::ShadowDepth,
+            color: ColorMethod::Hemoglobin,
+            wrinkles: WrinkleMethod::PartialDerivative,
+            specular: SpecularMethod::OneLobe,
+            antialias: AntialiasMethod::SmaaS2x,
+            antialias_preset: antialias::Preset::High,
+            antialias_patterns: antialias::Patterns::Revised,
+            profile: DiffusionProfile::default(),
+            shadow_size: 2048,
+        }
+    }
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self { exposure: 1.8, tone_map: ToneMap::Filmic }
+    }
+}
+
+impl Preset {
+    /// Every preset, the fastest first.
+    pub const ALL: [Self; 4] = [Self::Draft, Self::Review, Self::Final, Self::Reference];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Review => "review",
+            Self::Final => "final",
+            Self::Reference => "reference",
+        }
+    }
+
+    /// What it chooses.
+    pub fn quality(self) -> Quality {
+        let review = Quality::default();
+        match self {
+            Self::Draft => Quality {
+                scatter: ScatterMethod::Separable(9),
+                transmit: TransmitMethod::None,
+                antialias: AntialiasMethod::Smaa1x,
+                shadow_size: 1024,
+                ..review
+            },
+            Self::Review => review,
+            Self::Final => Quality {
+                scatter: ScatterMethod::Separable(33),
+                antialias: AntialiasMethod::Ssaa(4),
+                shadow_size: 4096,
+                ..review
+            },
+            Self::Reference => Quality {
+                scatter: ScatterMethod::ReferenceSurface(64),
+                antialias: AntialiasMethod::Ssaa(4),
+                shadow_size: 4096,
+                ..review
+            },
+        }
+    }
+}
+
+impl Settings {
+    /// Samples on a side of a pixel: those asked for and those of `ssaa:N`.
+    pub fn samples_per_side(&self) -> u32 {
+        self.output.supersampling * self.quality.antialias.supersampling()
+    }
+
+    /// Pixels that the passes before the resolve draw.
+    pub fn frame_size(&self) -> [u32; 2] {
+        self.output.size.map(|n| n * self.samples_per_side())
+    }
+
+    /// What the antialiasing pass is given.
+    pub fn antialias(&self) -> antialias::Settings {
+        let mode = self.quality.antialias.into();
+        let preset = self.quality.antialias_preset;
+        match self.quality.antialias_patterns {
+            antialias::Patterns::Revised => antialias::Settings::new(mode, preset),
+            antialias::Patterns::Published => antialias::Settings::published(mode, preset),
+        }
+    }
+
+    /// Replaces what a JSON object of the same shape names; the rest stays.
+    ///
+    /// # Errors
+    /// An unknown field, a value of the wrong type, an unknown method.
+    pub fn overlay(&mut self, changes: &Value) -> Result<(), SettingsError> {
+        let wrong = |e: serde_json::Error| SettingsError::Json(e.to_string());
+        let mut whole = serde_json::to_value(&*self).map_err(wrong)?;
+        merge(&mut whole, changes);
+        *self = serde_json::from_value(whole).map_err(wrong)?;
+        Ok(())
+    }
+
+    /// Checks every range of the schema.
+    ///
+    /// # Errors
+    /// Names the first setting out of range.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        self.quality.scatter.validate().map_err(|e| out_of_range("quality.scatter", e))?;
+        self.quality.antialias.validate().map_err(|e| out_of_range("quality.antialias", e))?;
+        if !self.look.exposure.is_finite() {
+            return Err(SettingsError::Range {
+                setting: "look.exposure".into(),
+                found: self.look.exposure.to_string(),
+                expected: "a finite number".into(),
+            });
+        }
+        leaves::check_ranges(self)
+    }
+}
+
+fn out_of_range(setting: &str, e: UnknownMethod) -> SettingsError {
+    SettingsError::Range { setting: setting.into(), found: e.found, expected: e.expected }
+}
+
+/// Objects are merged, everything else is replaced.
+fn merge(whole: &mut Value, changes: &Value) {
+    match (whole, changes) {
+        (Value::Object(whole), Value::Object(changes)) => {
+            for (name, change) in changes {
+                merge(whole.entry(name).or_insert(Value::Null), change);
+            }
+        }
+        (whole, changes) => *whole = changes.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn settings_read_back_and_unknown_fields_are_refused() {
+        for preset in Preset::ALL {
+            let settings = Settings { quality: preset.quality(), ..Settings::default() };
+            settings.validate().expect("presets are in range");
+            let text = serde_json::to_string(&settings).expect("it is written");
+            assert_eq!(serde_json::from_str::<Settings>(&text).expect("it reads"), settings);
+        }
+        let mut settings = Settings::default();
+        let unknown = settings.overlay(&json!({ "quality": { "scater": "none" } }));
+        assert!(unknown.expect_err("a slip").to_string().contains("scater"));
+        let wrong = settings.overlay(&json!({ "quality": { "scatter": "separable:8" } }));
+        assert!(wrong.expect_err("even").to_string().contains("N odd"));
+        assert_eq!(settings, Settings::default(), "a refused overlay changes nothing");
+    }
+
+    #[test]
+    fn ranges_are_those_of_the_schema() {
+        let wrong = |change: fn(&mut Settings)| {
+            let mut settings = Settings::default();
+            change(&mut settings);
+            settings.validate().expect_err("it is out of range").to_string()
+        };
+        assert_eq!(wrong(|s| s.output.supersampling = 9), "output.supersampling: found 9, expected 1 to 8");
+        assert!(wrong(|s| s.quality.shadow_size = 8).contains("16 to 16384"));
+        assert!(wrong(|s| s.look.exposure = -1.0).starts_with("look.exposure: found -1"));
+        assert!(wrong(|s| s.look.exposure = f32::NAN).contains("finite"));
+        assert!(wrong(|s| s.quality.scatter = ScatterMethod::Separable(4)).contains("separable:N"));
+    }
+}
