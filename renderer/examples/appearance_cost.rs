@@ -51,6 +51,7 @@ fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<[
         camera: Camera { position: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 },
         lights: &[],
         environment: None,
+        environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
     };
@@ -68,7 +69,7 @@ fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<[
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     for _ in 0..FRAMES {
         let start = std::time::Instant::now();
-        let (_, stats) = renderer.render(&scene, &settings)?;
+        let (_, stats) = render(renderer, &scene, &settings)?;
         frames.push(1e3 * start.elapsed().as_secs_f64());
         times.extend(stats.passes_ms.iter().filter(|(name, _)| *name == "appearance").map(|(_, ms)| *ms));
     }

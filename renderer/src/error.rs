@@ -39,7 +39,7 @@ pub enum RenderError {
     Head(#[from] rubor_rig::error::HeadError),
     /// Antialiasing settings out of range.
     #[error(transparent)]
-    Antialias(#[from] crate::passes::antialias::AntialiasError),
+    Antialias(#[from] AntialiasError),
     /// The diffusion profile or a kernel of it is out of range.
     #[error(transparent)]
     Skin(#[from] rubor_rig::error::SkinError),
@@ -52,4 +52,56 @@ pub enum RenderError {
     /// The device stopped answering or ran out of memory.
     #[error("the device failed: {0}")]
     Lost(String),
+}
+
+/// What keeps the antialiasing pass from running.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AntialiasError {
+    /// A setting is out of range.
+    #[error("antialias setting {name} is {found}, expected {expected}")]
+    Setting {
+        /// Name in files.
+        name: &'static str,
+        /// Its value.
+        found: f32,
+        /// Its range.
+        expected: String,
+    },
+    /// The image is empty or larger than the device takes.
+    #[error("an image of {width} x {height} pixels cannot be antialiased, expected 1 to {limit} a side")]
+    Size {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// Pixels.
+        limit: u32,
+    },
+    /// Something the settings ask for was not handed over.
+    #[error("{mode} with these settings takes {expected} {what}, found {found}")]
+    Inputs {
+        /// Name of the mode.
+        mode: &'static str,
+        /// What it takes.
+        what: &'static str,
+        /// How many.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// Files have one sample a pixel and no previous frame.
+    #[error("{mode} needs more than an image, expected mlaa or smaa-1x")]
+    NotAFilter {
+        /// Name of the mode.
+        mode: &'static str,
+    },
+    /// The output format cannot be written by a compute shader.
+    #[error("antialiasing cannot write {found:?}, expected Rgba8Unorm, Rgba16Float or Rgba32Float")]
+    Format {
+        /// What was asked for.
+        found: wgpu::TextureFormat,
+    },
+    /// The device failed.
+    #[error("the device failed: {0}")]
+    Device(String),
 }

@@ -2,49 +2,44 @@
 //!
 //! ```text
 //! Head --HeadOnGpu::new--> HeadOnGpu --+
-//! FaceState, Camera, Lights -----------+--> Scene --Renderer::render--> Image, FrameStats
+//! FaceState, Camera, Lights -----------+--> Scene, Settings --Renderer::draw--> Drawn --finish--> Image, FrameStats
 //! EnvironmentMap::upload --> Environment +
 //! ```
 //!
-//! The passes of a frame stand in order in `frame.rs`; each is a folder under `passes`.
-//! The crate knows no file format.
+//! Where to look: [`settings`] defines every setting and the one table of methods; `frame/realtime.rs` is the order of a
+//! frame; each pass is a folder under `passes`; `device` opens devices, links shaders and records. The crate knows no file
+//! format and waits for no device; `native` does, for programs outside of a browser.
 //!
 //! ```no_run
-//! use rubor_renderer::{Gpu, Renderer};
+//! use rubor_renderer::{Renderer, native};
 //!
-//! let renderer = Renderer::new(Gpu::new(None)?)?;
+//! let renderer = Renderer::new(native::open(None)?)?;
 //! println!("{}", renderer.gpu().info.name);
 //! # Ok::<(), rubor_renderer::RenderError>(())
 //! ```
 
 pub mod channels;
-mod clusters;
-mod environment;
+mod device;
 mod error;
-pub mod footprint;
 mod frame;
-mod gpu;
-mod head;
-mod pass_timer;
 mod passes;
-mod placement;
+mod renderer;
 mod scene;
 pub mod settings;
-mod targets;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
 mod tests;
-mod texture;
 
-pub use environment::{Environment, EnvironmentMap};
+#[cfg(not(target_arch = "wasm32"))]
+pub use device::native;
+pub use device::{AdapterDescription, FrameTimes, Gpu, PassTimer, PendingTimes};
 pub use error::RenderError;
-pub use frame::{FrameStats, Image, Renderer};
-pub use gpu::{AdapterDescription, Gpu, list_adapters};
-pub use head::{
-    ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
-};
-pub use pass_timer::{FrameTimes, PassTimer};
 pub use passes::antialias;
-pub use passes::scatter::surface::BARE_SKIN;
-pub use scene::{Camera, HeadInstance, Light, LightKind, MAX_HEADS, MAX_LIGHTS, NEAR_METRES, Scene};
+pub use passes::diffusion::surface::BARE_SKIN;
+pub use renderer::{Drawn, FrameStats, Image, Renderer};
+pub use scene::{
+    Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind,
+    MAX_DISTRIBUTIONS, MAX_HEADS, MAX_HEMOGLOBIN, MAX_LIGHTS, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
+    NEAR_METRES, Scene, footprint,
+};

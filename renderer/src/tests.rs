@@ -8,63 +8,76 @@ use rubor_rig::head::{
 };
 use rubor_rig::map::Map;
 
-use crate::frame::View;
-use crate::head::GpuVertex;
-use crate::passes::{
-    appearance, compose, display, morph, overlay, shade, shadow, surface_frames, velocity, visibility,
-};
+use crate::channels::{CHANNELS, Channel, ChannelData};
+use crate::device::native;
+use crate::passes::geometry::{morph, shadow, tangent_frames, velocity, visibility};
+use crate::passes::hair::overlay;
+use crate::passes::{appearance, compose, display, resolve, shade};
+use crate::scene::head::GpuVertex;
+use crate::scene::lamp::GpuLight;
+use crate::scene::view::View;
 use crate::settings::{
-    AntialiasMethod, Look, Output, Quality, ScatterMethod, Settings, SpecularMethod, TransmitMethod,
+    AntialiasMethod, Look, Output, Quality, ScatterMethod, Settings, SpecularMethod, ToneMap, TransmitMethod,
 };
-use crate::testing::{assert_layout, gpu, offsets, validated_workgroups};
+use crate::testing::{assert_layout, assert_raster, assert_workgroups, gpu, offsets, own_gpu};
 use crate::{
-    Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind, RenderError,
-    Renderer, Scene,
+    Camera, ColorTable, EnvironmentMap, FrameStats, HeadInstance, HeadOnGpu, Image, Light, LightKind,
+    RenderError, Renderer, Scene,
 };
 
 #[test]
 fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
-    let square = |name: &str| vec![(name.to_owned(), [8, 8, 1])];
-    let line = |name: &str| vec![(name.to_owned(), [64, 1, 1])];
-    assert_eq!(validated_workgroups(morph::SHADER), line("morph"));
-    assert_eq!(validated_workgroups(surface_frames::SHADER), line("surface_frames"));
-    assert_eq!(validated_workgroups(appearance::SHADER), square("appearance"));
-    assert_eq!(validated_workgroups(shade::SHADER), square("shade"));
-    assert_eq!(validated_workgroups(compose::SHADER), square("compose"));
-    assert_eq!(validated_workgroups(display::SHADER), square("display"));
-    assert_eq!(validated_workgroups(velocity::SHADER), square("velocity_main"));
-    let visibility = [true, false].map(visibility::shader);
-    for raster in [shadow::SHADER, &visibility[0], &visibility[1], overlay::SHADER] {
-        assert_eq!(validated_workgroups(raster), []);
+    let square = |entry| [(entry, [8, 8, 1])];
+    let line = |entry| [(entry, [64, 1, 1])];
+    assert_workgroups(&morph::program(), &line("morph"));
+    assert_workgroups(&tangent_frames::program(), &line("tangent_frames"));
+    assert_workgroups(&appearance::program(), &square("appearance"));
+    assert_workgroups(&shade::program(), &square("shade"));
+    assert_workgroups(&shade::samples_program(), &line("light_samples"));
+    assert_workgroups(&compose::program(), &square("compose"));
+    for tone_map in ToneMap::all() {
+        assert_workgroups(&display::program(tone_map), &square("display"));
+        assert_workgroups(&resolve::program(tone_map), &square("resolve_samples"));
     }
+    assert_workgroups(&velocity::program(), &square("screen_velocity"));
+    for numbered in [true, false] {
+        assert_raster(&visibility::program(numbered), &visibility::entries(numbered));
+    }
+    assert_raster(&shadow::program(), &["shadow_vertex"]);
+    assert_raster(&overlay::program(), &["overlay_vertex", "overlay_fragment"]);
 }
 
 #[test]
 fn structs_are_laid_out_alike_on_both_sides() {
     assert_layout(
-        &visibility::shader(false),
+        &shade::program(),
+        "shade",
         "View",
         size_of::<View>(),
         &offsets!(View; clip_from_world as "clip_from_world",
             previous_clip_from_world as "previous_clip_from_world", origin as "origin", right as "right",
             up as "up", forward as "forward", size as "size", head_count as "head_count",
             has_environment as "has_environment", jitter as "jitter", near as "near",
-            light_count as "light_count", shading_jitter as "shading_jitter", depth_origin_mm as "depth_origin_mm"),
+            light_count as "light_count", shading_jitter as "shading_jitter", depth_origin_mm as "depth_origin_mm",
+            environment_turn as "environment_turn"),
     );
     assert_layout(
-        &visibility::shader(false),
+        &shade::program(),
+        "shade",
         "Vertex",
         size_of::<GpuVertex>(),
         &offsets!(GpuVertex; point as "point", u as "u", v as "v"),
     );
     assert_layout(
-        morph::SHADER,
+        &morph::program(),
+        "morph",
         "Params",
         size_of::<morph::Params>(),
         &offsets!(morph::Params; world_from_head as "world_from_head", point_count as "point_count"),
     );
     assert_layout(
-        appearance::SHADER,
+        &appearance::program(),
+        "appearance",
         "Params",
         size_of::<appearance::Params>(),
         &offsets!(appearance::Params; distribution_count as "distribution_count", zone_count as "zone_count",
@@ -72,14 +85,16 @@ fn structs_are_laid_out_alike_on_both_sides() {
             zone_maps as "zone_maps"),
     );
     assert_layout(
-        shade::SHADER,
+        &shade::program(),
+        "shade",
         "Light",
-        size_of::<shade::GpuLight>(),
-        &offsets!(shade::GpuLight; clip_from_world as "clip_from_world", color as "color",
+        size_of::<GpuLight>(),
+        &offsets!(GpuLight; clip_from_world as "clip_from_world", color as "color",
             position as "position", spot as "spot", shape as "shape", shadow as "shadow"),
     );
     assert_layout(
-        shade::SHADER,
+        &shade::program(),
+        "shade",
         "Params",
         size_of::<shade::Params>(),
         &offsets!(shade::Params; slope_scale as "slope_scale", wrinkle_strength as "wrinkle_strength",
@@ -91,16 +106,25 @@ fn structs_are_laid_out_alike_on_both_sides() {
             ring_ends_mm as "ring_ends_mm", middle as "middle", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
-        overlay::SHADER,
+        &overlay::program(),
+        "overlay_vertex",
         "Params",
         size_of::<overlay::Params>(),
         &offsets!(overlay::Params; ambient as "ambient", first as "first", hair as "hair"),
     );
     assert_layout(
-        display::SHADER,
+        &display::program(ToneMap::Filmic),
+        "display",
         "Params",
         size_of::<display::Params>(),
-        &offsets!(display::Params; exposure as "exposure", samples as "samples"),
+        &offsets!(display::Params; exposure as "exposure"),
+    );
+    assert_layout(
+        &resolve::program(ToneMap::Filmic),
+        "resolve_samples",
+        "Params",
+        size_of::<resolve::Params>(),
+        &offsets!(resolve::Params; exposure as "exposure", samples as "samples"),
     );
 }
 
@@ -163,14 +187,44 @@ pub(crate) const WHITE_TABLE: ColorTable<'static> =
     ColorTable { width: 2, height: 2, texels: &[[0.8; 3]; 4] };
 
 pub(crate) fn renderer() -> Option<Renderer> {
-    gpu()?;
-    let gpu = Gpu::new(std::env::var("RUBOR_ADAPTER").ok().as_deref()).ok()?;
-    Some(Renderer::new(gpu).expect("the passes compile"))
+    Some(Renderer::new(own_gpu()?).expect("the passes compile"))
 }
 
+/// Draws and waits.
+pub(crate) fn render(
+    renderer: &mut Renderer,
+    scene: &Scene<'_>,
+    settings: &Settings,
+) -> Result<(Image, FrameStats), RenderError> {
+    let gpu = renderer.gpu().clone();
+    native::wait(&gpu, renderer.render(scene, settings))
+}
+
+/// A channel of the last frame.
+pub(crate) fn read(renderer: &Renderer, channel: Channel) -> ChannelData {
+    let data = native::wait(renderer.gpu(), renderer.read(channel)).expect("the channel comes back");
+    assert!(!data.values.is_empty(), "the frame has {}", channel.name());
+    data
+}
+
+/// A channel of three components as vectors.
+pub(crate) fn read_vectors(renderer: &Renderer, channel: Channel) -> Vec<Vec3> {
+    read(renderer, channel).texels::<3>().map(Vec3::from_array).collect()
+}
+
+/// A channel of four components.
+pub(crate) fn read_texels(renderer: &Renderer, channel: Channel) -> Vec<[f32; 4]> {
+    read(renderer, channel).texels().collect()
+}
+
+/// Every channel over pixels is kept.
 pub(crate) fn settings(size: [u32; 2]) -> Settings {
     Settings {
-        output: Output { size, ..Output::default() },
+        output: Output {
+            size,
+            channels: CHANNELS.iter().map(|row| row.channel).collect(),
+            ..Output::default()
+        },
         quality: Quality { antialias: AntialiasMethod::None, shadow_size: 256, ..Quality::default() },
         look: Look { exposure: 1.0, ..Look::default() },
     }
@@ -207,10 +261,11 @@ pub(crate) fn draw(
         camera: CAMERA,
         lights,
         environment: Some(&environment),
+        environment_rotation: 0.0,
         environment_intensity: 0.5,
         background_linear: Vec3::ZERO,
     };
-    Ok(renderer.render(&scene, settings)?.0)
+    Ok(render(renderer, &scene, settings)?.0)
 }
 
 #[test]
@@ -223,7 +278,7 @@ fn the_morph_kernel_places_points_where_the_cpu_does() {
     state.head_rotation = Quat::from_rotation_y(0.3);
     state.head_translation = Vec3::new(0.01, 0.0, -0.02);
     draw(&mut renderer, &on_gpu, &state, &[lamp()], &settings([27, 51])).expect("it draws");
-    let found = renderer.read_positions().expect("positions come back");
+    let found = read_vectors(&renderer, Channel::Positions);
     let place = Mat4::from_rotation_translation(state.head_rotation, state.head_translation);
     let expected = deform::deform_points(&head.mesh, &head.shapes, &state.shapes);
     assert_eq!(found.len(), expected.len());
@@ -254,7 +309,7 @@ fn ambient_visibility_follows_the_shapes_as_on_the_cpu() {
         let mut state = FaceState::neutral(&head);
         state.shapes = weights.to_vec();
         draw(&mut renderer, &on_gpu, &state, &[], &settings([16, 16])).expect("it draws");
-        let found = renderer.read_occlusion().expect("visibility comes back");
+        let found = read(&renderer, Channel::Visibility).values;
         let expected = deform::blend_occlusion(&head.mesh, &head.shapes, &weights);
         for (i, (a, b)) in found.iter().zip(&expected).enumerate() {
             // Half a step of 1/511 for each of two values, times weights up to 1 in sum.
@@ -284,7 +339,7 @@ fn an_even_sky_comes_back_as_albedo_and_reflection_and_never_as_more() {
         let mut light = |head: &HeadOnGpu| -> Vec<f32> {
             draw(&mut renderer, head, &state, &[], &settings).expect("it draws");
             // The sky of `draw` has a radiance of 0.5.
-            renderer.read_hdr().expect("light comes back").iter().map(|t| 2.0 * t[0]).collect()
+            read_texels(&renderer, Channel::Radiance).iter().map(|t| 2.0 * t[0]).collect()
         };
         let most = light(&pale).into_iter().fold(0.0, f32::max);
         assert!((0.8..1.0).contains(&most), "{specular}: {most}");
@@ -317,14 +372,15 @@ fn normals_and_tangents_are_those_of_the_cpu_on_both_sides_of_a_seam() {
     let mut state = FaceState::neutral(&head);
     state.shapes = vec![0.5, 1.0];
     draw(&mut renderer, &on_gpu, &state, &[], &settings([16, 16])).expect("it draws");
-    let frames = renderer.read_surface_frames().expect("frames come back");
+    let frames: Vec<[f32; 7]> = read(&renderer, Channel::TangentFrames).texels().collect();
     let points = deform::deform_points(&head.mesh, &head.shapes, &state.shapes);
     let normals = deform::point_normals(&head.mesh, &points);
     let tangents = deform::vertex_tangents(&head.mesh, &points, &normals);
     let mut used = vec![false; head.mesh.vertices.len()];
     head.mesh.triangles.iter().flatten().for_each(|v| used[*v as usize] = true);
     for (i, vertex) in head.mesh.vertices.iter().enumerate().filter(|(i, _)| used[*i]) {
-        let (normal, tangent) = frames[i];
+        let f = frames[i];
+        let (normal, tangent) = (Vec3::new(f[0], f[1], f[2]), glam::Vec4::new(f[3], f[4], f[5], f[6]));
         assert!(normal.abs_diff_eq(normals[vertex.point as usize], 1e-4), "normal {i}");
         assert!(tangent.abs_diff_eq(tangents[i], 1e-3), "tangent {i}: {tangent} {}", tangents[i]);
     }
@@ -352,7 +408,7 @@ fn a_white_furnace_returns_what_comes_in() {
     let state = FaceState::neutral(&head);
     let size = [65, 65];
     draw(&mut renderer, &on_gpu, &state, &[], &settings(size)).expect("it draws");
-    let hdr = renderer.read_hdr().expect("light comes back");
+    let hdr = read_texels(&renderer, Channel::Radiance);
     let center = hdr[32 * 65 + 32];
     for c in 0..3 {
         assert!((center[c] - 0.4).abs() < 2e-3, "{center:?}");
@@ -408,7 +464,7 @@ fn wrong_settings_are_answered_in_words() {
     assert!(message(|_| {}, &broken).contains("shape weights is 1; 2"));
     broken.shapes.push(f32::NAN);
     assert!(message(|_| {}, &broken).contains("finite"));
-    assert!(Gpu::new(Some("no such adapter")).err().expect("refused").to_string().contains("there are"));
+    assert!(native::open(Some("no such adapter")).err().expect("refused").to_string().contains("there are"));
 }
 
 #[test]
@@ -427,10 +483,11 @@ fn several_heads_of_one_frame_keep_apart() {
         camera: Camera { position: Vec3::new(0.0, 0.0, 1.0), ..CAMERA },
         lights: &[Light { kind: LightKind::Directional { direction: Vec3::NEG_Z }, ..lamp() }],
         environment: None,
+        environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
     };
-    let image = renderer.render(&scene, &settings([64, 32])).expect("it draws").0;
+    let image = render(&mut renderer, &scene, &settings([64, 32])).expect("it draws").0;
     let lit = |x: usize, y: usize| image.rgba[4 * (y * 64 + x) + 1] > 40;
     assert!(lit(23, 16) && lit(41, 16), "both are there");
     assert!(!lit(32, 2), "the sky between them is empty");

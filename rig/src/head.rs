@@ -116,6 +116,11 @@ impl Material {
         Material::Other,
     ];
 
+    /// Its place in [`Material::ALL`]: the number that shaders know it by.
+    pub fn number(self) -> u32 {
+        Self::ALL.iter().position(|m| *m == self).unwrap_or(0) as u32
+    }
+
     /// True for parts that go through the visibility buffer; lashes, hair and wet shells are blended over it.
     pub fn is_opaque(self) -> bool {
         !matches!(self, Material::Lash | Material::Hair | Material::Wet | Material::Hidden)

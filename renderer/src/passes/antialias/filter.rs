@@ -2,20 +2,19 @@
 
 use super::reference::{Edges, Picture, Weights};
 use super::{Antialias, AntialiasError, Inputs, Mode, Settings};
+use crate::device::{Gpu, PassTimer};
 use crate::error::RenderError;
-use crate::gpu::Gpu;
-use crate::pass_timer::PassTimer;
 use wgpu::{TextureFormat, TextureUsages};
 
 /// Filters images one after the other; images of the same size share what the device needs.
 ///
 /// ```no_run
-/// use rubor_renderer::{Gpu, antialias::{Filter, Settings}};
+/// use rubor_renderer::{antialias::{Filter, Settings}, native};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let gpu = Gpu::new(None)?;
+/// let gpu = native::open(None)?;
 /// let mut filter = Filter::new(&gpu, Settings::default())?;
 /// let white_over_black = [[255; 8], [0; 8]].concat();
-/// let smooth = filter.bytes(2, 2, &white_over_black)?;
+/// let smooth = native::wait(&gpu, filter.bytes(2, 2, &white_over_black))?;
 /// assert_eq!(smooth.len(), 16);
 /// # Ok(())
 /// # }
@@ -55,18 +54,18 @@ impl<'a> Filter<'a> {
     ///
     /// # Errors
     /// An empty or too large image, a wrong number of bytes, or the device failed.
-    pub fn bytes(&mut self, width: u32, height: u32, rgba: &[u8]) -> Result<Vec<u8>, AntialiasError> {
+    pub async fn bytes(&mut self, width: u32, height: u32, rgba: &[u8]) -> Result<Vec<u8>, AntialiasError> {
         self.run([width, height], TextureFormat::Rgba8Unorm, rgba)?;
-        self.read(|ready| &ready.output)
+        self.read(|ready| &ready.output).await
     }
 
     /// Filters floats. Not a number must not occur.
     ///
     /// # Errors
     /// An empty or too large image, a wrong number of pixels, or the device failed.
-    pub fn picture(&mut self, picture: &Picture) -> Result<Picture, AntialiasError> {
+    pub async fn picture(&mut self, picture: &Picture) -> Result<Picture, AntialiasError> {
         self.run_picture(picture)?;
-        let pixels = bytemuck::pod_collect_to_vec(&self.read(|ready| &ready.output)?);
+        let pixels = bytemuck::pod_collect_to_vec(&self.read(|ready| &ready.output).await?);
         Ok(Picture { pixels, ..*picture })
     }
 
@@ -74,19 +73,19 @@ impl<'a> Filter<'a> {
     ///
     /// # Errors
     /// As [`Filter::picture`].
-    pub fn edges(&mut self, picture: &Picture) -> Result<Edges, AntialiasError> {
+    pub async fn edges(&mut self, picture: &Picture) -> Result<Edges, AntialiasError> {
         self.run_picture(picture)?;
-        self.read_edges()
+        self.read_edges().await
     }
 
     /// Only the blending weights of a picture.
     ///
     /// # Errors
     /// As [`Filter::picture`].
-    pub fn weights(&mut self, picture: &Picture) -> Result<Vec<Weights>, AntialiasError> {
+    pub async fn weights(&mut self, picture: &Picture) -> Result<Vec<Weights>, AntialiasError> {
         self.run_picture(picture)?;
-        let edges = self.read_edges()?;
-        let texels = self.read(|ready| &ready.pass.samples[0].weights_texture)?;
+        let edges = self.read_edges().await?;
+        let texels = self.read(|ready| &ready.pass.samples[0].weights_texture).await?;
         let weights = bytemuck::pod_collect_to_vec::<u8, Weights>(&texels);
         // Where there is no edge the texture is never written.
         let known = |i: usize| if edges.top[i] || edges.left[i] { weights[i] } else { [0; 4] };
@@ -130,22 +129,22 @@ impl<'a> Filter<'a> {
         let (color, output) =
             (ready.input.create_view(&Default::default()), ready.output.create_view(&Default::default()));
         let inputs = Inputs { colors: &[&color], ..Default::default() };
-        let mut timer = PassTimer::new(self.gpu);
+        let mut timer = PassTimer::default();
         ready.pass.record(self.gpu, &mut encoder, &mut timer, &inputs, &output, None)?;
         self.gpu.queue.submit([encoder.finish()]);
         Ok(())
     }
 
-    fn read(&self, texture: impl Fn(&Ready) -> &wgpu::Texture) -> Result<Vec<u8>, AntialiasError> {
+    async fn read(&self, texture: impl Fn(&Ready) -> &wgpu::Texture) -> Result<Vec<u8>, AntialiasError> {
         let ready =
             self.ready.as_ref().ok_or_else(|| AntialiasError::Device("nothing was filtered".to_owned()))?;
-        self.gpu.read_texture(texture(ready)).map_err(device_error)
+        self.gpu.read_texture(texture(ready)).await.map_err(device_error)
     }
 
-    fn read_edges(&self) -> Result<Edges, AntialiasError> {
+    async fn read_edges(&self) -> Result<Edges, AntialiasError> {
         let ready =
             self.ready.as_ref().ok_or_else(|| AntialiasError::Device("nothing was filtered".to_owned()))?;
-        let bytes = self.gpu.read_buffer(&ready.pass.samples[0].bits).map_err(device_error)?;
+        let bytes = self.gpu.read_buffer(&ready.pass.samples[0].bits).await.map_err(device_error)?;
         let words: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&bytes);
         let [width, height] = ready.size.map(|side| side as usize);
         let row = width.div_ceil(super::TILE as usize);

@@ -68,9 +68,13 @@ pub use settings::{
 };
 pub use tables::Tables;
 
-use crate::gpu::Gpu;
-use crate::pass_timer::PassTimer;
-use wgpu::{BindingResource, TextureFormat, TextureUsages, TextureView};
+use wgpu::{TextureFormat, TextureUsages, TextureView};
+
+use crate::device::kernel::Resource;
+use crate::device::wgsl::{Module, Program, module};
+use crate::device::{Bind, Gpu, Kernel, PassTimer};
+pub use crate::error::AntialiasError;
+use crate::passes::pixel_groups;
 
 /// K of equation 10.6: how fast the previous frame fades with the difference of speeds.
 pub const REPROJECTION_WEIGHT: f32 = 30.0;
@@ -85,58 +89,6 @@ const TILE: u32 = 32;
 const MOST_WORKGROUPS: u32 = 2048;
 /// Relative rounding of the half floats that the history is stored in.
 const HISTORY_PRECISION: f32 = 1.0 / 1024.0;
-
-/// What keeps the pass from running.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum AntialiasError {
-    /// A setting is out of range.
-    #[error("antialias setting {name} is {found}, expected {expected}")]
-    Setting {
-        /// Name in files.
-        name: &'static str,
-        /// Its value.
-        found: f32,
-        /// Its range.
-        expected: String,
-    },
-    /// The image is empty or larger than the device takes.
-    #[error("an image of {width} x {height} pixels cannot be antialiased, expected 1 to {limit} a side")]
-    Size {
-        /// Pixels.
-        width: u32,
-        /// Pixels.
-        height: u32,
-        /// Pixels.
-        limit: u32,
-    },
-    /// Something the settings ask for was not handed over.
-    #[error("{mode} with these settings takes {expected} {what}, found {found}")]
-    Inputs {
-        /// Name of the mode.
-        mode: &'static str,
-        /// What it takes.
-        what: &'static str,
-        /// How many.
-        expected: usize,
-        /// How many there are.
-        found: usize,
-    },
-    /// Files have one sample a pixel and no previous frame.
-    #[error("{mode} needs more than an image, expected mlaa or smaa-1x")]
-    NotAFilter {
-        /// Name of the mode.
-        mode: &'static str,
-    },
-    /// The output format cannot be written by a compute shader.
-    #[error("antialiasing cannot write {found:?}, expected Rgba8Unorm, Rgba16Float or Rgba32Float")]
-    Format {
-        /// What was asked for.
-        found: TextureFormat,
-    },
-    /// The device failed.
-    #[error("the device failed: {0}")]
-    Device(String),
-}
 
 /// Parameters of every kernel; the layout is that of `Params` in `shared.wgsl`.
 #[repr(C)]
@@ -233,9 +185,9 @@ pub struct Antialias {
     params: [Vec<wgpu::Buffer>; 2],
     params_with_history: wgpu::Buffer,
     areas: wgpu::Buffer,
-    edges: wgpu::ComputePipeline,
-    weights: wgpu::ComputePipeline,
-    last: wgpu::ComputePipeline,
+    edges: Kernel,
+    weights: Kernel,
+    last: Kernel,
     /// Stand-ins for bindings that a mode does not use.
     unused_output: TextureView,
     unused_light: TextureView,
@@ -283,10 +235,10 @@ impl Antialias {
         {
             return Err(AntialiasError::Size { width, height, limit });
         }
-        let output_name = match output {
-            TextureFormat::Rgba8Unorm => "rgba8unorm",
-            TextureFormat::Rgba16Float => "rgba16float",
-            TextureFormat::Rgba32Float => "rgba32float",
+        let format_flag = match output {
+            TextureFormat::Rgba8Unorm => "rgba8",
+            TextureFormat::Rgba16Float => "rgba16",
+            TextureFormat::Rgba32Float => "rgba32",
             found => return Err(AntialiasError::Format { found }),
         };
 
@@ -295,7 +247,7 @@ impl Antialias {
         let simple = samples == 1 && !settings.mode.is_temporal();
         let dispatch = if simple { dispatch } else { Dispatch::Tiles };
         let by_tiles = simple && dispatch == Dispatch::Tiles;
-        let source = |kernel: Kernel| kernel.source(settings, dispatch, output_name);
+        let kernel = |step: Step| step.kernel(gpu, settings, dispatch, format_flag);
         let tables = Tables::new(settings);
         let make_params = |frame: u64, sample: usize, history_valid: u32| {
             let plain = settings.predication.map_or(1.0, |p| p.scale);
@@ -351,13 +303,9 @@ impl Antialias {
             params: [0, 1].map(|frame| (0..samples).map(|sample| make_params(frame, sample, 0)).collect()),
             params_with_history: make_params(0, 0, 1),
             areas: gpu.storage("antialias coverage", &tables.areas.areas),
-            edges: gpu.compute_pipeline("antialias edges", &source(Kernel::Edges), "edges"),
-            weights: gpu.compute_pipeline("antialias weights", &source(Kernel::Weights), "weights"),
-            last: if by_tiles {
-                gpu.compute_pipeline("antialias blend", &source(Kernel::Blend), "blend")
-            } else {
-                gpu.compute_pipeline("antialias resolve", &source(Kernel::Resolve), "resolve")
-            },
+            edges: kernel(Step::Edges),
+            weights: kernel(Step::Weights),
+            last: kernel(if by_tiles { Step::Blend } else { Step::Resolve }),
             unused_output: single(output),
             unused_light: single(TextureFormat::Rgba16Float),
             unused_speed: single(TextureFormat::R32Float),
@@ -368,6 +316,11 @@ impl Antialias {
     /// The settings that the pass was made with.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// Columns and rows of the images that it takes.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
     }
 
     /// Bytes of device memory, without the history and the caller's images.
@@ -422,47 +375,31 @@ impl Antialias {
             let color = inputs.colors[index];
             let depth = if self.settings.needs_depth() { inputs.depths[index] } else { &self.unused_texture };
             let copy = if self.by_tiles() { output } else { &self.unused_output };
-            {
-                let group = gpu.bind(
-                    "antialias edges",
-                    &self.edges,
-                    0,
-                    &[
-                        params[index].as_entire_binding(),
-                        BindingResource::TextureView(color),
-                        BindingResource::TextureView(depth),
-                        sample.bits.as_entire_binding(),
-                        sample.tiles.as_entire_binding(),
-                        BindingResource::TextureView(copy),
-                    ],
-                );
-                let mut pass = timer.compute(encoder, "antialias edges");
-                pass.set_pipeline(&self.edges);
-                pass.set_bind_group(0, &group, &[]);
-                pass.dispatch_workgroups(self.size[0].div_ceil(TILE), self.size[1].div_ceil(TILE), 1);
-            }
+            let resources = [
+                ("params", params[index].bound()),
+                ("color", color.bound()),
+                ("depth", depth.bound()),
+                ("bits", sample.bits.bound()),
+                ("tiles", sample.tiles.bound()),
+                ("copy", copy.bound()),
+            ];
+            let groups = [self.size[0].div_ceil(TILE), self.size[1].div_ceil(TILE), 1];
+            dispatch(gpu, encoder, timer, &self.edges, &resources, groups);
             if mode == Mode::None {
                 continue;
             }
-            let mut resources = vec![
-                params[index].as_entire_binding(),
-                sample.bits.as_entire_binding(),
-                self.areas.as_entire_binding(),
-                BindingResource::TextureView(&sample.weights),
+            let resources = [
+                ("params", params[index].bound()),
+                ("bits", sample.bits.bound()),
+                ("areas", self.areas.bound()),
+                ("weights_out", sample.weights.bound()),
+                ("tiles", sample.tiles.bound()),
             ];
-            if self.dispatch == Dispatch::Tiles {
-                resources.push(sample.tiles.as_entire_binding());
-            }
-            let group = gpu.bind("antialias weights", &self.weights, 0, &resources);
-            let mut pass = timer.compute(encoder, "antialias weights");
-            pass.set_pipeline(&self.weights);
-            pass.set_bind_group(0, &group, &[]);
-            match self.dispatch {
-                Dispatch::Tiles => pass.dispatch_workgroups(self.tile_workgroups(), 1, 1),
-                Dispatch::Screen => {
-                    pass.dispatch_workgroups(self.size[0].div_ceil(8), self.size[1].div_ceil(8), 1)
-                }
-            }
+            let groups = match self.dispatch {
+                Dispatch::Tiles => [self.tile_workgroups(), 1, 1],
+                Dispatch::Screen => pixel_groups(self.size),
+            };
+            dispatch(gpu, encoder, timer, &self.weights, &resources, groups);
         }
         if self.by_tiles() {
             if mode != Mode::None {
@@ -483,23 +420,15 @@ impl Antialias {
         output: &TextureView,
     ) {
         let sample = &self.samples[0];
-        let group = gpu.bind(
-            "antialias blend",
-            &self.last,
-            0,
-            &[
-                self.params[0][0].as_entire_binding(),
-                sample.bits.as_entire_binding(),
-                BindingResource::TextureView(inputs.colors[0]),
-                BindingResource::TextureView(&sample.weights),
-                sample.tiles.as_entire_binding(),
-                BindingResource::TextureView(output),
-            ],
-        );
-        let mut pass = timer.compute(encoder, "antialias blend");
-        pass.set_pipeline(&self.last);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(self.tile_workgroups(), 1, 1);
+        let resources = [
+            ("params", self.params[0][0].bound()),
+            ("bits", sample.bits.bound()),
+            ("color", inputs.colors[0].bound()),
+            ("weights", sample.weights.bound()),
+            ("tiles", sample.tiles.bound()),
+            ("output", output.bound()),
+        ];
+        dispatch(gpu, encoder, timer, &self.last, &resources, [self.tile_workgroups(), 1, 1]);
     }
 
     fn record_resolve(
@@ -527,105 +456,128 @@ impl Antialias {
         };
         let (first, second) = (0, self.samples.len() - 1);
         let params = if valid { &self.params_with_history } else { &self.params[0][0] };
-        let texture = BindingResource::TextureView;
-        let group = gpu.bind(
-            "antialias resolve",
-            &self.last,
-            0,
-            &[
-                params.as_entire_binding(),
-                texture(output),
-                self.samples[first].bits.as_entire_binding(),
-                texture(inputs.colors[first]),
-                texture(&self.samples[first].weights),
-                self.samples[second].bits.as_entire_binding(),
-                texture(inputs.colors[second]),
-                texture(&self.samples[second].weights),
-                texture(inputs.velocity.unwrap_or(&self.unused_texture)),
-                texture(light),
-                texture(speed),
-                texture(kept_light),
-                texture(kept_speed),
-            ],
-        );
-        let mut pass = timer.compute(encoder, "antialias resolve");
-        pass.set_pipeline(&self.last);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(self.size[0].div_ceil(8), self.size[1].div_ceil(8), 1);
+        let resources = [
+            ("params", params.bound()),
+            ("output", output.bound()),
+            ("bits_a", self.samples[first].bits.bound()),
+            ("color_a", inputs.colors[first].bound()),
+            ("weights_a", self.samples[first].weights.bound()),
+            ("bits_b", self.samples[second].bits.bound()),
+            ("color_b", inputs.colors[second].bound()),
+            ("weights_b", self.samples[second].weights.bound()),
+            ("velocity", inputs.velocity.unwrap_or(&self.unused_texture).bound()),
+            ("previous_light", light.bound()),
+            ("previous_speed", speed.bound()),
+            ("kept_light", kept_light.bound()),
+            ("kept_speed", kept_speed.bound()),
+        ];
+        dispatch(gpu, encoder, timer, &self.last, &resources, pixel_groups(self.size));
     }
 }
 
+/// A pass of one dispatch. The filter for images has no frame to record into, so this takes a device and an encoder.
+fn dispatch(
+    gpu: &Gpu,
+    encoder: &mut wgpu::CommandEncoder,
+    timer: &mut PassTimer,
+    kernel: &Kernel,
+    resources: &[Resource<'_>],
+    [x, y, z]: [u32; 3],
+) {
+    let groups = kernel.bindings.bind(gpu, resources);
+    let mut pass = timer.compute(gpu, encoder, kernel.label);
+    pass.set_pipeline(&kernel.pipeline);
+    for (index, group) in groups.iter().enumerate() {
+        pass.set_bind_group(index as u32, group, &[]);
+    }
+    pass.dispatch_workgroups(x, y, z);
+}
+
+const SHARED: Module = module!("antialias_shared", "shared.wesl");
+const MIXING: Module = module!("antialias_mixing", "mixing.wesl");
+const EDGES: Module = module!("antialias_edges", "edges.wesl");
+const WEIGHTS: Module = module!("antialias_weights", "weights.wesl");
+const WEIGHTS_SCREEN: Module = module!("antialias_weights_screen", "weights_screen.wesl");
+const WEIGHTS_TILES: Module = module!("antialias_weights_tiles", "weights_tiles.wesl");
+const TILES: Module = module!("antialias_tiles", "tiles.wesl");
+const BLEND: Module = module!("antialias_blend", "blend.wesl");
+const RESOLVE: Module = module!("antialias_resolve", "resolve.wesl");
+
 /// The kernels of the pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kernel {
+enum Step {
     Edges,
     Weights,
     Blend,
     Resolve,
 }
 
-impl Kernel {
-    /// WGSL of the kernel for some settings. Choices are constants, so that the compiler drops what is not used.
-    fn source(self, settings: &Settings, dispatch: Dispatch, output_format: &str) -> String {
+impl Step {
+    fn kernel(self, gpu: &Gpu, settings: &Settings, dispatch: Dispatch, format_flag: &'static str) -> Kernel {
+        let label = match self {
+            Self::Edges => "antialias edges",
+            Self::Weights => "antialias weights",
+            Self::Blend => "antialias blend",
+            Self::Resolve => "antialias resolve",
+        };
+        let (program, entry) = self.program(settings, dispatch, format_flag);
+        Kernel::new(gpu, label, &program, entry)
+    }
+
+    /// The shader of the kernel for some settings, and its entry point. Choices are constants, so that the compiler drops
+    /// what is not used.
+    fn program(
+        self,
+        settings: &Settings,
+        dispatch: Dispatch,
+        format_flag: &'static str,
+    ) -> (Program, &'static str) {
         let mode = settings.mode;
         let by_tiles = dispatch == Dispatch::Tiles && mode.subsamples(0).len() == 1 && !mode.is_temporal();
         let sources = [EdgeSource::Luma, EdgeSource::Color, EdgeSource::Depth];
         let edge_source = sources.iter().position(|&source| source == settings.edges).unwrap_or(0);
-        let constants = match self {
-            Self::Edges => format!(
-                "const SOURCE_COLOR = 1u;\nconst SOURCE_DEPTH = 2u;\nconst EDGE_SOURCE = {edge_source}u;\n\
-                 const LINEAR_INPUT = {};\nconst PREDICATION = {};\nconst LOCAL_CONTRAST = {};\nconst COPY = {by_tiles};\n\
-                 const LIST_TILES = {};\nconst STEPS = {:?}f;\nconst BRIGHTEST = {:?}f;\n",
-                settings.encoding == Encoding::Linear,
-                settings.predication.is_some(),
-                mode != Mode::Mlaa,
-                mode != Mode::None && dispatch == Dispatch::Tiles,
-                reference::STEPS,
-                reference::BRIGHTEST,
-            ),
-            Self::Weights => format!(
-                "const STOP_AT_CROSSINGS = {};\nconst DIAGONALS = {};\nconst ROUND_CORNERS = {};\n\
-                 const RUN_ON = {};\nconst DIAGONAL_SLOT = {}u;\n",
-                mode != Mode::Mlaa,
-                settings.diagonal_steps > 0,
-                settings.corner_rounding < 100,
-                settings.patterns == Patterns::Revised,
-                lookups::DIAGONAL_SLOT,
-            ),
-            Self::Blend | Self::Resolve => format!(
-                "const DECODE = {};\nconst AVERAGE_LINES = {};\nconst PAIR = {};\nconst TEMPORAL = {};\n\
-                 const REPROJECTION_WEIGHT = {REPROJECTION_WEIGHT:?}f;\nconst SPEED_UNIT_PX = {SPEED_UNIT_PX:?}f;\n\
-                 const HISTORY_PRECISION = {HISTORY_PRECISION:?}f;\n",
-                settings.encoding == Encoding::Srgb && settings.blend_space == BlendSpace::Linear,
-                mode == Mode::Mlaa,
-                mode.subsamples(0).len() == 2,
-                mode.is_temporal(),
-            ),
-        };
-        // The last kernel that reads the list of tiles empties it.
-        let empties_list = if by_tiles { self == Self::Blend } else { self == Self::Weights };
-        let constants = format!(
-            "{constants}const EMPTIES_LIST = {empties_list};\nconst STRAIGHT_ALPHA = {};\nconst PUBLISHED = {};\n",
-            settings.alpha == Alpha::Straight,
-            settings.patterns == Patterns::Published,
-        );
-        let parts: &[&str] = match self {
-            Self::Edges => &[include_str!("edges.wgsl")],
-            Self::Weights if dispatch == Dispatch::Tiles => &[
-                include_str!("weights.wgsl"),
-                include_str!("weights_tiles.wgsl"),
-                include_str!("tiles.wgsl"),
-            ],
-            Self::Weights => &[include_str!("weights.wgsl"), include_str!("weights_screen.wgsl")],
-            Self::Blend => {
-                &[include_str!("mixing.wgsl"), include_str!("blend.wgsl"), include_str!("tiles.wgsl")]
+        let (program, entry) = match self {
+            Self::Edges => (Program::new(EDGES), "edges"),
+            Self::Weights if dispatch == Dispatch::Tiles => {
+                (Program::new(TILES).with(&[WEIGHTS, WEIGHTS_TILES]), "every_tile")
             }
-            Self::Resolve => &[include_str!("mixing.wgsl"), include_str!("resolve.wgsl")],
+            Self::Weights => (Program::new(WEIGHTS_SCREEN).with(&[WEIGHTS]), "weights_of_pixel"),
+            Self::Blend => (Program::new(TILES).with(&[BLEND, MIXING]).flag("blend", true), "every_tile"),
+            Self::Resolve => (Program::new(RESOLVE).with(&[MIXING]), "resolve"),
         };
-        let shared = include_str!("shared.wgsl");
-        let entry = if self == Self::Blend { "blend" } else { "weights" };
-        let body = parts.concat().replace("OUTPUT_FORMAT", output_format).replace("EVERY_TILE", entry);
-        format!("{constants}\n{shared}\n{body}")
+        let program = program
+            .with(&[SHARED])
+            .flag(format_flag, true)
+            .constant("SOURCE_COLOR", 1u32)
+            .constant("SOURCE_DEPTH", 2u32)
+            .constant("EDGE_SOURCE", edge_source as u32)
+            .constant("LINEAR_INPUT", settings.encoding == Encoding::Linear)
+            .constant("PREDICATION", settings.predication.is_some())
+            .constant("LOCAL_CONTRAST", mode != Mode::Mlaa)
+            .constant("COPY", by_tiles)
+            .constant("LIST_TILES", mode != Mode::None && dispatch == Dispatch::Tiles)
+            .constant("STEPS", reference::STEPS)
+            .constant("BRIGHTEST", reference::BRIGHTEST)
+            .constant("STOP_AT_CROSSINGS", mode != Mode::Mlaa)
+            .constant("DIAGONALS", settings.diagonal_steps > 0)
+            .constant("ROUND_CORNERS", settings.corner_rounding < 100)
+            .constant("RUN_ON", settings.patterns == Patterns::Revised)
+            .constant("DIAGONAL_SLOT", lookups::DIAGONAL_SLOT as u32)
+            .constant(
+                "DECODE",
+                settings.encoding == Encoding::Srgb && settings.blend_space == BlendSpace::Linear,
+            )
+            .constant("AVERAGE_LINES", mode == Mode::Mlaa)
+            .constant("PAIR", mode.subsamples(0).len() == 2)
+            .constant("TEMPORAL", mode.is_temporal())
+            .constant("REPROJECTION_WEIGHT", REPROJECTION_WEIGHT)
+            .constant("SPEED_UNIT_PX", SPEED_UNIT_PX)
+            .constant("HISTORY_PRECISION", HISTORY_PRECISION)
+            // The last kernel that reads the list of tiles empties it.
+            .constant("EMPTIES_LIST", if by_tiles { self == Self::Blend } else { self == Self::Weights })
+            .constant("STRAIGHT_ALPHA", settings.alpha == Alpha::Straight)
+            .constant("PUBLISHED", settings.patterns == Patterns::Published);
+        (program, entry)
     }
 }
 

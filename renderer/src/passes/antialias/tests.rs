@@ -1,7 +1,8 @@
 use super::reference::*;
 use super::scenes::*;
 use super::*;
-use crate::testing::gpu;
+use crate::device::native;
+use crate::testing::{assert_layout, assert_workgroups, gpu, offsets};
 
 /// A small generator of repeatable noise (xorshift).
 struct Noise(u64);
@@ -81,14 +82,14 @@ fn assert_kernels_equal_the_reference(sizes: &[(usize, usize)], settings: Settin
         for (name, picture) in hostile_pictures(width, height) {
             let what = format!("{name} {width} x {height}");
             let (edges, weights, blended) = reference_1x(&picture, &settings);
-            assert_eq!(filter.edges(&picture).unwrap(), edges, "edges of {what}");
-            let found = filter.weights(&picture).unwrap();
+            assert_eq!(native::wait(gpu, filter.edges(&picture)).unwrap(), edges, "edges of {what}");
+            let found = native::wait(gpu, filter.weights(&picture)).unwrap();
             let wrong = (0..found.len()).find(|&i| found[i] != weights[i]);
             let detail = wrong.map(|i| (i % width, i / width, found[i], weights[i]));
             assert_eq!(detail, None, "weights of {what}");
             // The power functions of the two sides agree to some 1e-6, and the steepest part of the sRGB curve
             // magnifies that 13 times.
-            assert_close(&filter.picture(&picture).unwrap(), &blended, 3e-5, &what);
+            assert_close(&native::wait(gpu, filter.picture(&picture)).unwrap(), &blended, 3e-5, &what);
         }
     }
 }
@@ -134,10 +135,10 @@ fn one_colour_keeps_its_bits() {
         let mut filter = Filter::new(gpu, Settings::new(mode, Preset::Ultra)).unwrap();
         for (width, height) in [(1, 1), (1, 45), (45, 1), (33, 65)] {
             let bytes = [13, 200, 255, 77].repeat(width * height);
-            assert_eq!(filter.bytes(width as u32, height as u32, &bytes).unwrap(), bytes);
+            assert_eq!(native::wait(gpu, filter.bytes(width as u32, height as u32, &bytes)).unwrap(), bytes);
             let odd = [0.1f32, 7.3, 1e-7, 0.31];
             let picture = Picture::from_fn(width, height, |_, _| odd);
-            assert_eq!(filter.picture(&picture).unwrap(), picture);
+            assert_eq!(native::wait(gpu, filter.picture(&picture)).unwrap(), picture);
         }
     }
 }
@@ -172,7 +173,12 @@ fn large_images_stay_inside_the_limits() {
     let width = 8192;
     let picture =
         Picture::from_fn(width, 3, |x, y| if (x / 7 + y) % 2 == 0 { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] });
-    assert_close(&filter.picture(&picture).unwrap(), &reference_1x(&picture, &settings).2, 3e-5, "8192 x 3");
+    assert_close(
+        &native::wait(gpu, filter.picture(&picture)).unwrap(),
+        &reference_1x(&picture, &settings).2,
+        3e-5,
+        "8192 x 3",
+    );
 }
 
 #[test]
@@ -191,7 +197,7 @@ fn sizes_settings_and_inputs_are_checked() {
     assert!(Settings { threshold: f32::NAN, ..settings }.validate().is_err());
     let temporal = Settings::new(Mode::SmaaT2x, Preset::High);
     assert_eq!(Filter::new(gpu, temporal).err(), Some(AntialiasError::NotAFilter { mode: "smaa-t2x" }));
-    let short = Filter::new(gpu, settings).unwrap().bytes(2, 2, &[0; 15]);
+    let short = native::wait(gpu, Filter::new(gpu, settings).unwrap().bytes(2, 2, &[0; 15]));
     assert!(matches!(short, Err(AntialiasError::Inputs { expected: 16, found: 15, .. })), "{short:?}");
     let pass = Antialias::new(gpu, &temporal, [4, 4], TextureFormat::Rgba8Unorm).unwrap();
     let view = gpu.target(
@@ -203,7 +209,7 @@ fn sizes_settings_and_inputs_are_checked() {
     let view = view.create_view(&Default::default());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let inputs = Inputs { colors: &[&view], ..Default::default() };
-    let missing = pass.record(gpu, &mut encoder, &mut PassTimer::new(gpu), &inputs, &view, None);
+    let missing = pass.record(gpu, &mut encoder, &mut PassTimer::default(), &inputs, &view, None);
     assert!(matches!(missing, Err(AntialiasError::Inputs { what: "velocities", .. })), "{missing:?}");
 }
 
@@ -293,11 +299,11 @@ impl Frames {
         let output = self.output.create_view(&Default::default());
         let history = self.pass.settings().mode.is_temporal().then_some(&mut self.history);
         self.pass
-            .record(self.gpu, &mut encoder, &mut PassTimer::new(self.gpu), &inputs, &output, history)
+            .record(self.gpu, &mut encoder, &mut PassTimer::default(), &inputs, &output, history)
             .unwrap();
         self.gpu.queue.submit([encoder.finish()]);
         self.frame += 1;
-        let texels = self.gpu.read_texture(&self.output).unwrap();
+        let texels = native::wait(self.gpu, self.gpu.read_texture(&self.output)).unwrap();
         let pixels = if bytes {
             texels.chunks(4).map(|p| [0, 1, 2, 3].map(|c| f32::from(p[c]) / 255.0)).collect()
         } else {
@@ -411,9 +417,10 @@ fn the_list_of_tiles_is_empty_for_the_next_image() {
     let settings = Settings::new(Mode::Smaa1x, Preset::High);
     let mut filter = Filter::new(gpu, settings).unwrap();
     let pictures = hostile_pictures(130, 70);
-    let first: Vec<Picture> = pictures.iter().map(|(_, picture)| filter.picture(picture).unwrap()).collect();
+    let first: Vec<Picture> =
+        pictures.iter().map(|(_, picture)| native::wait(gpu, filter.picture(picture)).unwrap()).collect();
     for ((name, picture), first) in pictures.iter().zip(&first).rev() {
-        assert_eq!(&filter.picture(picture).unwrap(), first, "{name}");
+        assert_eq!(&native::wait(gpu, filter.picture(picture)).unwrap(), first, "{name}");
     }
 }
 
@@ -592,29 +599,28 @@ fn searches_equal_those_with_the_search_texture() {
 #[test]
 fn rust_and_wgsl_agree_on_the_parameters() {
     for mode in [Mode::Mlaa, Mode::Smaa1x, Mode::Smaa4x] {
-        for kernel in [Kernel::Edges, Kernel::Weights, Kernel::Blend, Kernel::Resolve] {
-            for dispatch in [Dispatch::Tiles, Dispatch::Screen] {
-                let source = kernel.source(&Settings::new(mode, Preset::High), dispatch, "rgba8unorm");
-                let module = naga::front::wgsl::parse_str(&source)
-                    .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&source)));
-                let (_, params) =
-                    module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Params")).unwrap();
-                let naga::TypeInner::Struct { members, span } = &params.inner else { panic!("not a struct") };
-                let found: Vec<(&str, usize)> =
-                    members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
-                macro_rules! fields {
-                    ($($name:ident)*) => { vec![$((stringify!($name), std::mem::offset_of!(Params, $name))),*] };
-                }
-                let expected = fields!(size words thresholds search_limits blocks first_column stride diagonal_base
-                    diagonal_steps depth_threshold corner_rounding history_valid falling_in_columns);
-                assert_eq!(found, expected);
-                assert_eq!(*span as usize, size_of::<Params>());
-                let group = match (kernel, dispatch) {
-                    (Kernel::Edges, _) => [TILE, 8, 1],
-                    (Kernel::Resolve, _) | (Kernel::Weights, Dispatch::Screen) => [8, 8, 1],
+        for step in [Step::Edges, Step::Weights, Step::Blend, Step::Resolve] {
+            for (dispatch, format) in
+                [(Dispatch::Tiles, "rgba8"), (Dispatch::Screen, "rgba16"), (Dispatch::Tiles, "rgba32")]
+            {
+                let (program, entry) = step.program(&Settings::new(mode, Preset::High), dispatch, format);
+                assert_layout(
+                    &program,
+                    entry,
+                    "Params",
+                    size_of::<Params>(),
+                    &offsets!(Params; size as "size", words as "words", thresholds as "thresholds",
+                        search_limits as "search_limits", blocks as "blocks", first_column as "first_column",
+                        stride as "stride", diagonal_base as "diagonal_base", diagonal_steps as "diagonal_steps",
+                        depth_threshold as "depth_threshold", corner_rounding as "corner_rounding",
+                        history_valid as "history_valid", falling_in_columns as "falling_in_columns"),
+                );
+                let group = match (step, dispatch) {
+                    (Step::Edges, _) => [TILE, 8, 1],
+                    (Step::Resolve, _) | (Step::Weights, Dispatch::Screen) => [8, 8, 1],
                     _ => [128, 1, 1],
                 };
-                assert_eq!(module.entry_points[0].workgroup_size, group);
+                assert_workgroups(&program, &[(entry, group)]);
             }
         }
     }

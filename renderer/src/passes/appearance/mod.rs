@@ -14,12 +14,21 @@
 //!
 //! Does not: clamp hemoglobin to its physical range (that needs `H_n`: see `shade`).
 
-use crate::gpu::Gpu;
-use crate::head::{APPEARANCE_SIZE, MAX_DISTRIBUTIONS, MAX_ZONES, MapsOnGpu};
-use crate::pass_timer::PassTimer;
+use crate::device::wgsl::{Module, Program, module};
+use crate::device::{Bind, Gpu, Kernel, Recorder};
+use crate::scene::head::{APPEARANCE_SIZE, MapsOnGpu};
+use crate::scene::posed_head::wrinkle_layers;
+use crate::scene::{MAX_DISTRIBUTIONS, MAX_ZONES, PosedHead};
+use crate::settings::ColorMethod;
 
-/// WGSL of the pass.
-pub(crate) const SHADER: &str = include_str!("appearance.wgsl");
+const SHADER: Module = module!("appearance", "appearance.wesl");
+
+/// The shader of the pass.
+pub(crate) fn program() -> Program {
+    Program::new(SHADER)
+        .constant("MAX_DISTRIBUTIONS", MAX_DISTRIBUTIONS as u32)
+        .constant("MAX_ZONES", MAX_ZONES as u32)
+}
 
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -33,114 +42,71 @@ pub(crate) struct Params {
     pub(crate) zone_maps: [u32; MAX_ZONES],
 }
 
-/// The maps that the pass makes for one head.
-pub(crate) struct Blended {
-    pub(crate) blood: wgpu::TextureView,
-    pub(crate) wrinkles: wgpu::TextureView,
-}
-
-impl Blended {
-    /// For a head with `wrinkle_maps` of them.
-    pub(crate) fn new(gpu: &Gpu, wrinkle_maps: u32) -> Self {
-        let usage = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
-        let wrinkles = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("wrinkle weights"),
-            size: wgpu::Extent3d {
-                width: APPEARANCE_SIZE,
-                height: APPEARANCE_SIZE,
-                depth_or_array_layers: layers_of(wrinkle_maps),
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba8Unorm,
-            usage,
-            view_formats: &[],
-        });
-        Self {
-            blood: gpu
-                .target("blood", [APPEARANCE_SIZE; 2], wgpu::TextureFormat::Rgba16Float, usage)
-                .create_view(&Default::default()),
-            wrinkles: crate::texture::array_view_of(&wrinkles),
-        }
-    }
-
-    /// Whether a head with `wrinkle_maps` of them can use it.
-    pub(crate) fn fits(&self, wrinkle_maps: u32) -> bool {
-        self.wrinkles.texture().depth_or_array_layers() == layers_of(wrinkle_maps)
-    }
-}
-
-/// Four wrinkle maps have their weights in one layer.
-fn layers_of(wrinkle_maps: u32) -> u32 {
-    wrinkle_maps.div_ceil(4).max(1)
-}
-
 /// The pipeline of the pass.
 pub(crate) struct Appearance {
-    pipeline: wgpu::ComputePipeline,
-    sampler: wgpu::Sampler,
+    kernel: Kernel,
+    linear_clamp: wgpu::Sampler,
 }
 
 impl Appearance {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("appearance"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        });
-        Self { pipeline: gpu.compute_pipeline("appearance", SHADER, "appearance"), sampler }
+        Self {
+            kernel: Kernel::new(gpu, "appearance", &program(), "appearance"),
+            linear_clamp: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("appearance"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            }),
+        }
     }
 
-    /// Blends for weights of a [`rubor_rig::face_state::FaceState`].
-    pub(crate) fn record(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        timer: &mut PassTimer,
-        maps: &MapsOnGpu,
-        distributions: &[f32],
-        zones: &[f32],
-        into: &Blended,
-    ) {
-        let filled = |from: &[f32]| {
-            let mut values = [0.0; 64];
-            for (v, w) in values.iter_mut().zip(from) {
-                *v = *w;
-            }
-            values
-        };
-        let mut zone_maps = [0; MAX_ZONES];
-        zone_maps[..maps.zone_maps.len()].copy_from_slice(&maps.zone_maps);
-        let params = Params {
-            distribution_count: maps.distribution_count.min(distributions.len() as u32),
-            zone_count: (maps.zone_maps.len() as u32).min(zones.len() as u32),
-            wrinkle_layers: layers_of(maps.wrinkle_maps),
-            padding: 0,
-            distribution_weights: filled(distributions),
-            zone_weights: filled(zones),
-            zone_maps,
-        };
-        let params = gpu.uniform("appearance", &params);
-        let group = gpu.bind(
-            "appearance",
-            &self.pipeline,
-            0,
-            &[
-                params.as_entire_binding(),
-                wgpu::BindingResource::TextureView(&maps.distributions),
-                wgpu::BindingResource::TextureView(&maps.neutral_mean),
-                wgpu::BindingResource::TextureView(&maps.masks),
-                wgpu::BindingResource::Sampler(&self.sampler),
-                wgpu::BindingResource::TextureView(&into.blood),
-                wgpu::BindingResource::TextureView(&into.wrinkles),
-            ],
-        );
-        let mut pass = timer.compute(encoder, "appearance");
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(APPEARANCE_SIZE / 8, APPEARANCE_SIZE / 8, 1);
+    /// Blends the maps of heads by the weights of their states.
+    pub(crate) fn record(&self, r: &mut Recorder<'_>, heads: &[PosedHead<'_>], color: ColorMethod) {
+        let with_maps: Vec<_> = heads
+            .iter()
+            .filter_map(|h| h.head.maps.as_ref().map(|maps| (h, maps)))
+            .map(|(h, maps)| (h, maps, r.uniform("appearance", &params(h, maps, color))))
+            .collect();
+        let each = with_maps.iter().map(|(h, maps, params)| {
+            let resources = vec![
+                ("params", params.bound()),
+                ("distributions", maps.distributions.bound()),
+                ("neutral_mean", maps.neutral_mean.bound()),
+                ("masks", maps.masks.bound()),
+                ("linear_clamp", self.linear_clamp.bound()),
+                ("blood", h.blood.bound()),
+                ("wrinkles", h.wrinkle_weights.bound()),
+            ];
+            (resources, [APPEARANCE_SIZE / 8, APPEARANCE_SIZE / 8, 1])
+        });
+        r.dispatch_each(&self.kernel, each);
+    }
+}
+
+fn params(posed: &PosedHead<'_>, maps: &MapsOnGpu, color: ColorMethod) -> Params {
+    let distributions: &[f32] = match color {
+        ColorMethod::Static => &[],
+        ColorMethod::Hemoglobin => &posed.state.distributions,
+    };
+    let zones = &posed.state.zones;
+    let filled = |from: &[f32]| {
+        let mut values = [0.0; 64];
+        for (v, w) in values.iter_mut().zip(from) {
+            *v = *w;
+        }
+        values
+    };
+    let mut zone_maps = [0; MAX_ZONES];
+    zone_maps[..maps.zone_maps.len()].copy_from_slice(&maps.zone_maps);
+    Params {
+        distribution_count: maps.distribution_count.min(distributions.len() as u32),
+        zone_count: (maps.zone_maps.len() as u32).min(zones.len() as u32),
+        wrinkle_layers: wrinkle_layers(maps.wrinkle_maps),
+        padding: 0,
+        distribution_weights: filled(distributions),
+        zone_weights: filled(zones),
+        zone_maps,
     }
 }
 

@@ -5,8 +5,9 @@ use rubor_rig::head::{Distribution, Head, WrinkleZone};
 use rubor_rig::hemoglobin::blend_texel;
 use rubor_rig::map::Map;
 
+use crate::channels::Channel;
 use crate::settings::{ColorMethod, WrinkleMethod};
-use crate::tests::{WHITE_TABLE, dome, draw, lamp, renderer, settings};
+use crate::tests::{WHITE_TABLE, dome, draw, lamp, read_texels, renderer, settings};
 use crate::{ColorTable, HeadOnGpu, MAX_HEMOGLOBIN, MAX_WRINKLE_MAPS, Renderer, footprint};
 
 const SIZE: usize = 24;
@@ -42,7 +43,7 @@ fn noise(i: usize) -> f32 {
 /// Address of the hemoglobin in the middle of the picture, and all albedos.
 fn blood(renderer: &mut Renderer, head: &HeadOnGpu, state: &FaceState) -> (f32, Vec<[f32; 4]>) {
     draw(renderer, head, state, &[], &settings([SIZE as u32; 2])).expect("it draws");
-    let albedo = renderer.read_albedo().expect("albedo comes back");
+    let albedo = read_texels(renderer, Channel::Albedo);
     (albedo[SIZE / 2 * SIZE + SIZE / 2][0], albedo)
 }
 
@@ -100,7 +101,7 @@ fn neutral_weights_and_static_colour_are_the_neutral_map_bit_for_bit() {
     let mut still = settings([SIZE as u32; 2]);
     still.quality.color = ColorMethod::Static;
     draw(&mut renderer, &on_gpu, &flushed, &[], &still).expect("it draws");
-    assert_eq!(renderer.read_albedo().expect("albedo comes back"), expected);
+    assert_eq!(read_texels(&renderer, Channel::Albedo), expected);
 }
 
 #[test]

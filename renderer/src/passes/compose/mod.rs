@@ -9,43 +9,42 @@
 
 use glam::Vec3;
 
-use crate::gpu::Gpu;
-use crate::pass_timer::PassTimer;
-use crate::passes::BLOCK_GROUP;
+use crate::device::wgsl::{Module, Program, module};
+use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
+use crate::passes::block_groups;
 
-/// WGSL of the pass.
-pub(crate) const SHADER: &str =
-    concat!(include_str!("../../shared/blocks.wgsl"), include_str!("compose.wgsl"));
+const SHADER: Module = module!("compose", "compose.wesl");
+
+/// The shader of the pass.
+pub(crate) fn program() -> Program {
+    Program::new(SHADER)
+}
 
 /// The pipeline of the pass.
 pub(crate) struct Compose {
-    pipeline: wgpu::ComputePipeline,
+    kernel: Kernel,
 }
 
 impl Compose {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        Self { pipeline: gpu.compute_pipeline("compose", SHADER, "compose") }
+        Self { kernel: Kernel::new(gpu, "compose", &program(), "compose") }
     }
 
     /// `inputs`: scattered, albedo, direct, depth.
-    pub(crate) fn record(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        timer: &mut PassTimer,
-        background_linear: Vec3,
-        inputs: [&wgpu::TextureView; 4],
-        hdr: &wgpu::TextureView,
-    ) {
-        let params = gpu.uniform("compose", &background_linear.extend(0.0));
-        let [scattered, albedo, direct, depth] = inputs.map(wgpu::BindingResource::TextureView);
-        let output = wgpu::BindingResource::TextureView(hdr);
-        let resources = [params.as_entire_binding(), scattered, albedo, direct, depth, output];
-        let group = gpu.bind("compose", &self.pipeline, 0, &resources);
-        let mut pass = timer.compute(encoder, "compose");
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        let size = hdr.texture().size();
-        pass.dispatch_workgroups(size.width.div_ceil(BLOCK_GROUP), size.height.div_ceil(BLOCK_GROUP), 1);
+    pub(crate) fn record(&self, r: &mut Recorder<'_>, background_linear: Vec3, inputs: [&Image; 4]) -> Image {
+        let params = r.uniform("compose", &background_linear.extend(0.0));
+        let [scattered, albedo, direct, depth] = inputs;
+        let size = albedo.size();
+        let hdr = r.image("radiance", ImageSpec::light(size).also(wgpu::TextureUsages::RENDER_ATTACHMENT));
+        let resources = [
+            ("params", params.bound()),
+            ("scattered", scattered.bound()),
+            ("albedo", albedo.bound()),
+            ("direct", direct.bound()),
+            ("depth", depth.bound()),
+            ("hdr", hdr.bound()),
+        ];
+        r.dispatch(&self.kernel, &resources, block_groups(size));
+        hdr
     }
 }

@@ -10,11 +10,13 @@ use glam::Vec3;
 
 /// Cosines of the viewer along a row and roughnesses down; the first and last stand at 0 and 1.
 const SIDE: u32 = 32;
+/// Columns of the table before the mean, for the shader.
+pub(crate) const COSINES: u32 = SIDE;
 /// Columns and rows of the table: one column more holds the mean over the hemisphere.
 pub(crate) const SIZE: [u32; 2] = [SIDE + 1, SIDE];
 /// Samples along and around the lobe.
 const SAMPLES: [u32; 2] = [24, 24];
-/// Least square of |L + V|, as in shade.wgsl: where both graze, the lobe would leave any bound.
+/// Least square of |L + V|, as in shade.wesl: where both graze, the lobe would leave any bound.
 const LEAST_SQUARE: f32 = 0.3;
 
 /// Factor of f0 and what is added to it.
@@ -86,7 +88,7 @@ fn mean(of_cosines: &[[f32; 4]]) -> [f32; 4] {
     sum
 }
 
-/// What enters skin from a lamp at a cosine over what enters of an even sky, for tests: the factor of shade.wgsl.
+/// What enters skin from a lamp at a cosine over what enters of an even sky, for tests: the factor of shade.wesl.
 #[cfg(test)]
 pub(crate) fn entering(specular: f32, roughness: f32, cosine: f32) -> f64 {
     let rho = |cosine: f32| {

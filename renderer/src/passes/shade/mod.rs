@@ -37,7 +37,7 @@
 //! integral of eq. 5.8 with the surface that the shadow map holds, so tilt, thickness and the edges of thin parts need
 //! no guess (no reversed normal, no 0.3 wrap, no shrinking); what the camera sees is left to `scatter`. Lamps without
 //! shadows transmit nothing. For the environment, which has no shadow map, a lamp behind the surface tells the
-//! thickness; where none shines from behind the head, `frame` places a dark one there.
+//! thickness; where none shines from behind the head, `scene::lamp::lamps` places a dark one there.
 //!
 //! Eyes, teeth and the lining of the mouth scatter light too, but not in `scatter`, whose profile is that of skin: their
 //! shadows are means over a disc as wide as light spreads in them (`spread_shadow`; the spread is about one over the
@@ -55,60 +55,62 @@ pub(crate) mod directional_albedo;
 #[cfg(test)]
 mod tests;
 
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Vec3, Vec4};
+use rubor_rig::head::Material;
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::skin::transmittance::TransmittanceTable;
 
-use crate::environment::Environment;
+use crate::device::kernel::Resource;
+use crate::device::wgsl::{Module, Program, module};
+use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder, texture};
 use crate::error::RenderError;
-use crate::gpu::Gpu;
-use crate::head::HeadOnGpu;
-use crate::pass_timer::PassTimer;
-use crate::passes::appearance::Blended;
-use crate::passes::shadow::LightView;
-use crate::scene::{Light, LightKind, MAX_LIGHTS};
-use crate::settings::{SpecularMethod, WrinkleMethod};
+use crate::passes::pixel_groups;
+use crate::scene::lamp::{GpuLight, Illumination};
+use crate::scene::view::Seen;
+use crate::scene::{MAX_HEMOGLOBIN, MAX_LIGHTS, PosedHead};
+use crate::settings::{ColorMethod, Quality, SpecularMethod, WrinkleMethod};
 
-/// WGSL of the pass.
-pub(crate) const SHADER: &str = concat!(
-    include_str!("../../shared/view.wgsl"),
-    include_str!("../../shared/math.wgsl"),
-    include_str!("../../shared/surface.wgsl"),
-    include_str!("../../shared/light.wgsl"),
-    include_str!("shade.wgsl"),
-    include_str!("eye.wgsl"),
-    include_str!("mouth.wgsl"),
-    include_str!("micro.wgsl")
-);
+const SHADER: Module = module!("shade", "shade.wesl");
+const SAMPLES_SHADER: Module = module!("shade_light_samples", "light_samples.wesl");
+const PARTS: [Module; 3] = [
+    module!("shade_eye", "eye.wesl"),
+    module!("shade_micro", "micro.wesl"),
+    module!("shade_mouth", "mouth.wesl"),
+];
 
-/// WGSL of the pass that lights points of the surface.
-pub(crate) const SAMPLES_SHADER: &str = concat!(
-    include_str!("../../shared/view.wgsl"),
-    include_str!("../../shared/math.wgsl"),
-    include_str!("../../shared/surface.wgsl"),
-    include_str!("../../shared/light.wgsl"),
-    include_str!("shade.wgsl"),
-    include_str!("eye.wgsl"),
-    include_str!("mouth.wgsl"),
-    include_str!("micro.wgsl"),
-    include_str!("light_samples.wgsl")
-);
+/// Share of a neighbour that scattering gives back to the centre for each millimetre that it is off the centre's tangent
+/// plane. A step of 4 mm (lip over teeth, wing of the nose over cheek) separates fully; the curve of a cheek does not.
+/// Transmittance leaves to scattering what that takes.
+pub(crate) const FOLLOW_PER_MM: f32 = 0.25;
+
+/// The shader of the pass.
+pub(crate) fn program() -> Program {
+    with_constants(Program::new(SHADER))
+}
+
+/// The shader of the pass that lights points of the surface.
+pub(crate) fn samples_program() -> Program {
+    with_constants(Program::new(SAMPLES_SHADER).with(&[SHADER]))
+}
+
+fn with_constants(program: Program) -> Program {
+    program
+        .with(&PARTS)
+        .constant("FOLLOW_PER_MM", FOLLOW_PER_MM)
+        .constant("MAX_HEMOGLOBIN", MAX_HEMOGLOBIN)
+        .constant("TRANSMIT_RINGS", RINGS as u32)
+        .constant("TABLE_COSINES", directional_albedo::COSINES)
+        .constant("SKIN", Material::Skin.number())
+        .constant("MUCOSA", Material::Mucosa.number())
+        .constant("EYE", Material::Eye.number())
+        .constant("TEETH", Material::Teeth.number())
+        .constant("GUMS", Material::Gums.number())
+}
 
 /// Entries of T(s): a step of 0.03 mm for skin.
 const TRANSMITTANCE_ENTRIES: usize = 256;
-/// Rings of the plane across a light; `TRANSMIT_RINGS` of the shader.
+/// Rings of the plane across a light.
 const RINGS: usize = 4;
-/// A light as the shader reads it; the fields are described there.
-#[repr(C)]
-#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
-pub(crate) struct GpuLight {
-    pub(crate) clip_from_world: Mat4,
-    pub(crate) color: [f32; 4],
-    pub(crate) position: [f32; 4],
-    pub(crate) spot: [f32; 4],
-    pub(crate) shape: [f32; 4],
-    pub(crate) shadow: [f32; 4],
-}
 
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -133,51 +135,6 @@ pub(crate) struct Params {
     pub(crate) middle: [f32; 4],
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
-}
-
-impl GpuLight {
-    /// A light with its shadow map, if it has one.
-    pub(crate) fn new(light: &Light, shadow: Option<(u32, LightView)>) -> Self {
-        let mut result: Self = bytemuck::Zeroable::zeroed();
-        result.color = light.color_linear.extend(light.radius).to_array();
-        result.spot[3] = -2.0;
-        match light.kind {
-            LightKind::Directional { direction } => {
-                result.position = (-direction.normalize_or(Vec3::NEG_Z)).extend(0.0).to_array();
-            }
-            LightKind::Point { position } => result.position = position.extend(1.0).to_array(),
-            LightKind::Spot { position, direction, outer_degrees, inner_degrees } => {
-                result.position = position.extend(1.0).to_array();
-                let outer = outer_degrees.to_radians().cos();
-                result.spot = direction.normalize_or(Vec3::NEG_Z).extend(outer).to_array();
-                // smoothstep needs two different edges.
-                result.shape[0] = inner_degrees.to_radians().cos().max(outer + 1e-4);
-            }
-        }
-        result.shape[1] = -1.0;
-        if let Some((layer, view)) = shadow {
-            result.clip_from_world = view.clip_from_world;
-            result.shape[1] = layer as f32;
-            result.shape[2] = view.near;
-            result.shape[3] = view.far;
-            result.shadow[0] = view.across;
-        }
-        result
-    }
-}
-
-/// What the pass reads that is the same for all heads of a frame.
-pub(crate) struct Lighting<'a> {
-    pub(crate) view: &'a wgpu::Buffer,
-    pub(crate) lights: [GpuLight; MAX_LIGHTS],
-    pub(crate) shadows: &'a wgpu::TextureView,
-    pub(crate) environment: Option<&'a Environment>,
-    pub(crate) environment_intensity: f32,
-    pub(crate) ids: &'a wgpu::TextureView,
-    pub(crate) depth: &'a wgpu::TextureView,
-    /// Ids and depth of the pixel's first sample, where this is not it: what looks the same there is not shaded again.
-    pub(crate) first: Option<(&'a wgpu::TextureView, &'a wgpu::TextureView)>,
-    pub(crate) transmittance: Option<&'a Transmittance>,
 }
 
 /// T(s) of a profile as a texture of one row.
@@ -206,7 +163,7 @@ impl Transmittance {
         Ok(Self {
             ring_taps_mm,
             ring_ends_mm,
-            table: crate::texture::upload_half(gpu, "transmittance", size, &[vec![texels]]),
+            table: texture::upload_half(gpu, "transmittance", size, &[vec![texels]]),
             thickness_max_mm: table.thickness_max_mm as f32,
         })
     }
@@ -241,20 +198,6 @@ fn rings(table: &TransmittanceTable) -> ([f32; RINGS], [f32; RINGS]) {
     (taps, ends)
 }
 
-/// What it reads of one head.
-pub(crate) struct Shaded<'a> {
-    pub(crate) index: u32,
-    pub(crate) head: &'a HeadOnGpu,
-    pub(crate) positions: &'a wgpu::Buffer,
-    pub(crate) frames: &'a wgpu::Buffer,
-    pub(crate) blended: &'a Blended,
-    pub(crate) hemoglobin_scale: f32,
-    pub(crate) pupil_mm: f32,
-    pub(crate) wrinkles: WrinkleMethod,
-    pub(crate) specular: SpecularMethod,
-    pub(crate) world_from_head: Mat4,
-}
-
 impl SpecularMethod {
     /// Factors of the map's roughness of a first and a second lobe, and the share of the second. Skin has slopes at
     /// scales from cells to furrows, and measured patches fit two lobes better than one (Graham et al. 2013,
@@ -269,11 +212,33 @@ impl SpecularMethod {
     }
 }
 
-/// The pipeline of the pass.
+/// What is common to the light of all heads of a frame.
+pub(crate) struct Lighting<'a> {
+    pub(crate) light: &'a Illumination<'a>,
+    pub(crate) seen: &'a Seen,
+    /// What the pixel's first sample sees, where this is not it: what looks the same there is not shaded again.
+    pub(crate) first: Option<&'a Seen>,
+    pub(crate) transmittance: Option<&'a Transmittance>,
+    pub(crate) quality: &'a Quality,
+}
+
+/// Light of what is seen.
+#[derive(Clone)]
+pub(crate) struct Lit {
+    /// Diffuse radiance of a white surface; a = depth in mm relative to `View::depth_origin_mm`: a texel is all that a tap
+    /// of scattering needs, and interpolates.
+    pub(crate) irradiance: Image,
+    /// Linear Rec. 709; a = strength of scattering.
+    pub(crate) albedo: Image,
+    /// Specular, and all of what does not scatter.
+    pub(crate) direct: Image,
+}
+
+/// The pipelines of the pass.
 pub(crate) struct Shade {
-    pipeline: wgpu::ComputePipeline,
+    kernel: Kernel,
     /// Made by the first frame that lights points of the surface.
-    samples_pipeline: Option<wgpu::ComputePipeline>,
+    samples_kernel: Option<Kernel>,
     trilinear_repeat: wgpu::Sampler,
     linear_clamp: wgpu::Sampler,
     compare: wgpu::Sampler,
@@ -291,12 +256,12 @@ impl Shade {
             ..Default::default()
         };
         let sampler = |d: &wgpu::SamplerDescriptor<'_>| gpu.device.create_sampler(d);
-        let black = crate::texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]);
+        let black = texture::upload_half(gpu, "black", [1, 1], &[vec![vec![[0.0; 4]]]]);
         let specular = SpecularMethod::OneLobe;
         Self {
             directional_albedo: (specular, upload_directional_albedo(gpu, specular)),
-            pipeline: gpu.compute_pipeline("shade", SHADER, "shade"),
-            samples_pipeline: None,
+            kernel: Kernel::new(gpu, "shade", &program(), "shade"),
+            samples_kernel: None,
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
                 label: Some("trilinear repeat"),
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -309,198 +274,157 @@ impl Shade {
                 compare: Some(wgpu::CompareFunction::LessEqual),
                 ..linear
             }),
-            black_array: crate::texture::array_view(&black),
+            black_array: texture::array_view(&black),
             black,
         }
     }
 
-    /// Makes what the method needs.
+    /// Makes what the method of highlights needs.
     pub(crate) fn prepare_specular(&mut self, gpu: &Gpu, method: SpecularMethod) {
         if self.directional_albedo.0 != method {
             self.directional_albedo = (method, upload_directional_albedo(gpu, method));
         }
     }
 
-    /// Shades the pixels that see one head into (irradiance, albedo, direct); head 0 also clears where nothing is.
+    /// Shades what is seen of heads. `into` takes the light of a first sample that this one may share.
     pub(crate) fn record(
         &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        timer: &mut PassTimer,
+        r: &mut Recorder<'_>,
         lighting: &Lighting<'_>,
-        shaded: &Shaded<'_>,
-        outputs: [&wgpu::TextureView; 3],
-    ) {
-        let maps = shaded.head.maps.as_ref();
-        let params = params(lighting, shaded);
-        let params = gpu.uniform("shade", &params);
-        let texture = wgpu::BindingResource::TextureView;
-        let environment = lighting.environment.map_or(&self.black, |e| &e.filtered);
-        let shared = gpu.bind(
-            "shade: frame",
-            &self.pipeline,
-            0,
-            &[
-                lighting.view.as_entire_binding(),
-                params.as_entire_binding(),
-                texture(lighting.ids),
-                texture(lighting.shadows),
-                texture(environment),
-                wgpu::BindingResource::Sampler(&self.trilinear_repeat),
-                wgpu::BindingResource::Sampler(&self.linear_clamp),
-                wgpu::BindingResource::Sampler(&self.compare),
-                texture(lighting.depth),
-                texture(lighting.first.map_or(lighting.ids, |f| f.0)),
-                texture(lighting.first.map_or(lighting.depth, |f| f.1)),
-                texture(lighting.transmittance.map_or(&self.black, |t| &t.table)),
-                texture(&self.directional_albedo.1),
-            ],
-        );
-        let head = gpu.bind(
-            "shade: head",
-            &self.pipeline,
-            1,
-            &[
-                shaded.positions.as_entire_binding(),
-                shaded.head.vertices.as_entire_binding(),
-                shaded.head.triangles.as_entire_binding(),
-                shaded.frames.as_entire_binding(),
-                texture(maps.map_or(&self.black, |m| &m.skin)),
-                texture(maps.map_or(&self.black, |m| &m.gloss)),
-                texture(maps.map_or(&self.black, |m| &m.slopes)),
-                texture(maps.map_or(&self.black_array, |m| &m.wrinkles)),
-                texture(&shaded.blended.blood),
-                texture(&shaded.blended.wrinkles),
-                texture(&shaded.head.skin_color),
-            ],
-        );
-        let targets = gpu.bind("shade: targets", &self.pipeline, 2, &outputs.map(texture));
-        let mut pass = timer.compute(encoder, "shade");
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &shared, &[]);
-        pass.set_bind_group(1, &head, &[]);
-        pass.set_bind_group(2, &targets, &[]);
-        let size = outputs[0].texture().size();
-        pass.dispatch_workgroups(size.width.div_ceil(8), size.height.div_ceil(8), 1);
+        heads: &[PosedHead<'_>],
+        into: Option<&Lit>,
+    ) -> Lit {
+        let size = lighting.seen.ids.size();
+        let lit = into.cloned().unwrap_or_else(|| Lit {
+            irradiance: r.image("irradiance", ImageSpec::light(size)),
+            albedo: r.image("albedo", ImageSpec::light(size)),
+            direct: r.image("direct", ImageSpec::light(size)),
+        });
+        let params: Vec<_> = heads.iter().map(|h| r.uniform("shade", &params(lighting, h))).collect();
+        let first = lighting.first.unwrap_or(lighting.seen);
+        let each = heads.iter().zip(&params).map(|(h, params)| {
+            let mut resources = self.resources(lighting, h, params);
+            resources.extend([
+                ("depth", lighting.seen.depth.bound()),
+                ("first_visible", first.ids.bound()),
+                ("first_depth", first.depth.bound()),
+                ("diffuse_out", lit.irradiance.bound()),
+                ("albedo_out", lit.albedo.bound()),
+                ("direct_out", lit.direct.bound()),
+            ]);
+            (resources, pixel_groups(size))
+        });
+        r.dispatch_each(&self.kernel, each);
+        lit
     }
 
     /// Makes what [`Shade::record_samples`] needs.
     pub(crate) fn prepare_samples(&mut self, gpu: &Gpu) {
-        self.samples_pipeline
-            .get_or_insert_with(|| gpu.compute_pipeline("light samples", SAMPLES_SHADER, "light_samples"));
+        self.samples_kernel
+            .get_or_insert_with(|| Kernel::new(gpu, "light samples", &samples_program(), "light_samples"));
     }
 
     /// Diffuse light at `count` points of a head's surface.
     pub(crate) fn record_samples(
         &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
+        r: &mut Recorder<'_>,
         lighting: &Lighting<'_>,
-        shaded: &Shaded<'_>,
+        head: &PosedHead<'_>,
         [samples, light]: [&wgpu::Buffer; 2],
         count: u32,
     ) {
-        let Some(pipeline) = &self.samples_pipeline else { return };
-        let maps = shaded.head.maps.as_ref();
-        let params = gpu.uniform("light samples", &params(lighting, shaded));
-        let texture = wgpu::BindingResource::TextureView;
-        let sampler = wgpu::BindingResource::Sampler;
-        let bind = |group: u32, resources: Vec<(u32, wgpu::BindingResource<'_>)>| {
-            let entries: Vec<_> = resources
-                .into_iter()
-                .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-                .collect();
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("light samples"),
-                layout: &pipeline.get_bind_group_layout(group),
-                entries: &entries,
-            })
-        };
-        let frame = bind(
-            0,
-            vec![
-                (0, lighting.view.as_entire_binding()),
-                (1, params.as_entire_binding()),
-                (2, texture(lighting.ids)),
-                (3, texture(lighting.shadows)),
-                (5, sampler(&self.trilinear_repeat)),
-                (6, sampler(&self.linear_clamp)),
-                (7, sampler(&self.compare)),
-                (12, texture(&self.directional_albedo.1)),
-            ],
-        );
-        let head = bind(
-            1,
-            vec![
-                (0, shaded.positions.as_entire_binding()),
-                (1, shaded.head.vertices.as_entire_binding()),
-                (2, shaded.head.triangles.as_entire_binding()),
-                (3, shaded.frames.as_entire_binding()),
-                (4, texture(maps.map_or(&self.black, |m| &m.skin))),
-                (5, texture(maps.map_or(&self.black, |m| &m.gloss))),
-                (6, texture(maps.map_or(&self.black, |m| &m.slopes))),
-                (7, texture(maps.map_or(&self.black_array, |m| &m.wrinkles))),
-                (8, texture(&shaded.blended.blood)),
-                (9, texture(&shaded.blended.wrinkles)),
-                (10, texture(&shaded.head.skin_color)),
-            ],
-        );
-        let data = bind(2, vec![(3, samples.as_entire_binding()), (4, light.as_entire_binding())]);
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &frame, &[]);
-        pass.set_bind_group(1, &head, &[]);
-        pass.set_bind_group(2, &data, &[]);
-        pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
+        let Some(kernel) = &self.samples_kernel else { return };
+        let params = r.uniform("light samples", &params(lighting, head));
+        let mut resources = self.resources(lighting, head, &params);
+        resources.extend([("surface_samples", samples.bound()), ("sample_light", light.bound())]);
+        r.dispatch(kernel, &resources, [count.div_ceil(64), 1, 1]);
+    }
+
+    /// What lights a head, on pixels or on points.
+    fn resources<'a>(
+        &'a self,
+        lighting: &Lighting<'a>,
+        posed: &PosedHead<'a>,
+        params: &'a wgpu::Buffer,
+    ) -> Vec<Resource<'a>> {
+        let maps = posed.head.maps.as_ref();
+        vec![
+            ("view", lighting.seen.view.bound()),
+            ("params", params.bound()),
+            ("visible", lighting.seen.ids.bound()),
+            ("shadows", lighting.light.shadows.bound()),
+            ("environment", lighting.light.environment.map_or(&self.black, |e| &e.filtered).bound()),
+            ("trilinear_repeat", self.trilinear_repeat.bound()),
+            ("linear_clamp", self.linear_clamp.bound()),
+            ("compare", self.compare.bound()),
+            ("transmittance", lighting.transmittance.map_or(&self.black, |t| &t.table).bound()),
+            ("directional_albedo", self.directional_albedo.1.bound()),
+            ("positions", posed.positions.bound()),
+            ("vertices", posed.head.vertices.bound()),
+            ("triangles", posed.head.triangles.bound()),
+            ("frames", posed.tangent_frames.bound()),
+            ("skin_map", maps.map_or(&self.black, |m| &m.skin).bound()),
+            ("gloss_map", maps.map_or(&self.black, |m| &m.gloss).bound()),
+            ("slope_map", maps.map_or(&self.black, |m| &m.slopes).bound()),
+            ("wrinkle_maps", maps.map_or(&self.black_array, |m| &m.wrinkles).bound()),
+            ("blood", posed.blood.bound()),
+            ("wrinkle_weights", posed.wrinkle_weights.bound()),
+            ("skin_color", posed.head.skin_color.bound()),
+        ]
     }
 }
 
 fn upload_directional_albedo(gpu: &Gpu, method: SpecularMethod) -> wgpu::TextureView {
     let table = vec![vec![directional_albedo::table(method.lobes())]];
-    crate::texture::upload_half(gpu, "directional albedo", directional_albedo::SIZE, &table)
+    texture::upload_half(gpu, "directional albedo", directional_albedo::SIZE, &table)
 }
 
 /// Numbers of the pass for one head.
-fn params(lighting: &Lighting<'_>, shaded: &Shaded<'_>) -> Params {
-    let maps = shaded.head.maps.as_ref();
+fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
+    let maps = posed.head.maps.as_ref();
+    let quality = lighting.quality;
+    let hemoglobin_scale = match quality.color {
+        ColorMethod::Static => 1.0,
+        ColorMethod::Hemoglobin => posed.state.hemoglobin_scale,
+    };
     Params {
         // Maps hold true depths; interreflection between pores, which is not drawn, would deepen them to the eye.
         slope_scale: 1.35,
         wrinkle_strength: 1.25,
         // Finite times finite: blood beyond its range is clamped, but NaN would not be.
-        hemoglobin_scale: shaded.hemoglobin_scale.clamp(-1e6, 1e6),
-        head: shaded.index,
-        environment_intensity: lighting.environment_intensity,
-        environment_levels: lighting.environment.map_or(1.0, |e| e.levels as f32),
+        hemoglobin_scale: hemoglobin_scale.clamp(-1e6, 1e6),
+        head: posed.index,
+        environment_intensity: lighting.light.environment_intensity,
+        environment_levels: lighting.light.environment_levels(),
         has_maps: u32::from(maps.is_some()),
-        wrinkle_map_count: match shaded.wrinkles {
+        wrinkle_map_count: match quality.wrinkles {
             WrinkleMethod::None => 0,
             WrinkleMethod::PartialDerivative | WrinkleMethod::Difference => {
                 maps.map_or(0, |m| m.wrinkle_maps)
             }
         },
         is_second_sample: u32::from(lighting.first.is_some()),
-        adds_differences: u32::from(shaded.wrinkles == WrinkleMethod::Difference),
-        pupil_mm: shaded.pupil_mm,
+        adds_differences: u32::from(quality.wrinkles == WrinkleMethod::Difference),
+        pupil_mm: posed.state.pupil_mm,
         transmit_per_mm: lighting.transmittance.map_or(0.0, |t| 1.0 / t.thickness_max_mm),
-        lobes: shaded.specular.lobes(),
-        mm_per_texture: shaded.head.mm_per_texture,
+        lobes: quality.specular.lobes(),
+        mm_per_texture: posed.head.mm_per_texture,
         ring_taps_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_taps_mm),
         ring_ends_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_ends_mm),
         hair_color: maps.map_or([0.0; 4], |m| {
             let [r, g, b] = m.hair_color_linear;
             [r, g, b, 1.0]
         }),
-        middle: middle(shaded).to_array(),
-        harmonics: lighting.environment.map_or([[0.0; 4]; 9], |e| e.harmonics),
-        lights: lighting.lights,
+        middle: middle(posed).to_array(),
+        harmonics: lighting.light.harmonics(),
+        lights: lighting.light.lights,
     }
 }
 
 /// The plane between the halves of a head: its dot product with a place in the world is positive on the character's left.
-fn middle(shaded: &Shaded<'_>) -> Vec4 {
-    let (low, high) = shaded.head.bounds;
-    let left = shaded.world_from_head.transform_vector3(Vec3::X);
-    let center = shaded.world_from_head.transform_point3(0.5 * (low + high));
+fn middle(posed: &PosedHead<'_>) -> Vec4 {
+    let (low, high) = posed.head.bounds;
+    let left = posed.world_from_head.transform_vector3(Vec3::X);
+    let center = posed.world_from_head.transform_point3(0.5 * (low + high));
     left.extend(-left.dot(center))
 }

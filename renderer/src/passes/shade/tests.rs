@@ -4,7 +4,8 @@ use glam::{Mat4, Vec2, Vec3};
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Head, Material, Mesh, Part, Vertex};
 
-use crate::tests::{WHITE_TABLE, renderer, settings};
+use crate::channels::Channel;
+use crate::tests::{WHITE_TABLE, read_texels, render, renderer, settings};
 use crate::{Camera, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
 const SIZE: u32 = 128;
@@ -56,13 +57,14 @@ fn row(renderer: &mut Renderer, material: Material, has_flap: bool) -> Vec<f32> 
             casts_shadow: true,
         }],
         environment: None,
+        environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
     };
     let mut settings = settings([SIZE; 2]);
     settings.quality.shadow_size = 1024;
-    renderer.render(&scene, &settings).expect("it draws");
-    let hdr = renderer.read_hdr().expect("light comes back");
+    render(renderer, &scene, &settings).expect("it draws");
+    let hdr = read_texels(renderer, Channel::Radiance);
     (0..SIZE).map(|x| hdr[(SIZE / 2 * SIZE + x) as usize][1]).collect()
 }
 

@@ -1,0 +1,142 @@
+//! How a frame is put together: [`realtime`] in one go, [`reference`] with as many samples as it is given.
+//!
+//! [`stages`] holds what both do alike. A stage calls passes; it knows no method of theirs.
+
+pub(crate) mod realtime;
+pub(crate) mod reference;
+pub(crate) mod stages;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::Mat4;
+use rubor_rig::skin::profile::Profile;
+
+use crate::channels::Channel;
+use crate::device::{Gpu, Image};
+use crate::error::RenderError;
+use crate::passes::antialias::{self, Antialias, History};
+use crate::passes::appearance::Appearance;
+use crate::passes::compose::Compose;
+use crate::passes::diffusion::Needs;
+use crate::passes::display::Display;
+use crate::passes::geometry::morph::Morph;
+use crate::passes::geometry::shadow::Shadow;
+use crate::passes::geometry::tangent_frames::TangentFrames;
+use crate::passes::geometry::velocity::Velocity;
+use crate::passes::geometry::visibility::Visibility;
+use crate::passes::hair::cropped_hair::CroppedHair;
+use crate::passes::hair::fibre::Fibre;
+use crate::passes::hair::overlay::Overlay;
+use crate::passes::resolve::Resolve;
+use crate::passes::shade::{Shade, Transmittance};
+use crate::scene::{Light, PosedHead, Scene};
+use crate::settings::{Settings, ToneMap, TransmitMethod};
+
+/// The passes of frames, with their pipelines.
+pub(crate) struct Passes {
+    pub(crate) morph: Morph,
+    pub(crate) tangent_frames: TangentFrames,
+    pub(crate) appearance: Appearance,
+    pub(crate) shadow: Shadow,
+    pub(crate) visibility: Visibility,
+    pub(crate) shade: Shade,
+    pub(crate) compose: Compose,
+    pub(crate) velocity: Velocity,
+    pub(crate) fibre: Fibre,
+    pub(crate) cropped_hair: CroppedHair,
+    pub(crate) overlay: Overlay,
+    pub(crate) tone_map: ToneMap,
+    pub(crate) resolve: Resolve,
+    pub(crate) display: Display,
+    /// Where the settings ask for it.
+    pub(crate) antialias: Option<Antialias>,
+    pub(crate) transmittance: Option<(Arc<Profile>, Transmittance)>,
+}
+
+/// A frame while it is recorded.
+pub(crate) struct Frame<'a> {
+    pub(crate) passes: &'a Passes,
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) settings: &'a Settings,
+    pub(crate) heads: Vec<PosedHead<'a>>,
+    pub(crate) lamps: Vec<Light>,
+    pub(crate) needs: Needs,
+    pub(crate) past: &'a mut Past,
+    /// Where the picture goes; an image of the frame's own without one.
+    pub(crate) into: Option<&'a wgpu::TextureView>,
+    /// Images that somebody wants to read.
+    pub(crate) kept: BTreeMap<Channel, Image>,
+}
+
+/// The previous frame: all that one frame leaves to the next.
+#[derive(Default)]
+pub(crate) struct Past {
+    pub(crate) history: Option<History>,
+    pub(crate) clip_from_world: Option<Mat4>,
+    pub(crate) frames: u64,
+}
+
+impl Past {
+    /// Forgets it. The count of frames goes on.
+    pub(crate) fn forget(&mut self) {
+        *self = Self { frames: self.frames, ..Self::default() };
+    }
+}
+
+impl Passes {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let tone_map = ToneMap::Filmic;
+        Self {
+            morph: Morph::new(gpu),
+            tangent_frames: TangentFrames::new(gpu),
+            appearance: Appearance::new(gpu),
+            shadow: Shadow::new(gpu),
+            visibility: Visibility::new(gpu),
+            shade: Shade::new(gpu),
+            compose: Compose::new(gpu),
+            velocity: Velocity::new(gpu),
+            fibre: Fibre::new(gpu),
+            cropped_hair: CroppedHair::new(gpu),
+            overlay: Overlay::new(gpu),
+            tone_map,
+            resolve: Resolve::new(gpu, tone_map),
+            display: Display::new(gpu, tone_map),
+            antialias: None,
+            transmittance: None,
+        }
+    }
+
+    /// Makes what frames with these settings need, unless it is there.
+    ///
+    /// # Errors
+    /// The profile cannot be tabulated, or the antialiasing is out of range.
+    pub(crate) fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        settings: &Settings,
+        needs: &Needs,
+    ) -> Result<(), RenderError> {
+        let wanted = settings.antialias();
+        let size = settings.output.size;
+        if wanted.mode == antialias::Mode::None {
+            self.antialias = None;
+        } else if self.antialias.as_ref().is_none_or(|a| *a.settings() != wanted || a.size() != size) {
+            let format = wgpu::TextureFormat::Rgba8Unorm;
+            self.antialias = Some(Antialias::new(gpu, &wanted, size, format)?);
+        }
+        let profile = settings.quality.profile.shared();
+        if settings.quality.transmit == TransmitMethod::None || !needs.transmittance {
+            self.transmittance = None;
+        } else if self.transmittance.as_ref().is_none_or(|(p, _)| p != profile) {
+            self.transmittance = Some((profile.clone(), Transmittance::new(gpu, profile)?));
+        }
+        self.shade.prepare_specular(gpu, settings.quality.specular);
+        if self.tone_map != settings.look.tone_map {
+            self.tone_map = settings.look.tone_map;
+            self.resolve = Resolve::new(gpu, self.tone_map);
+            self.display = Display::new(gpu, self.tone_map);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,30 @@
+//! A frame in one go: the order of the stages.
+
+use super::Frame;
+use super::stages::Samples;
+use crate::device::{Image, Recorder};
+use crate::error::RenderError;
+use crate::passes::diffusion::Diffusion;
+
+/// Records a frame; the picture is in the image that is returned, or where the frame was told to put it.
+///
+/// # Errors
+/// The antialiasing lacks an input.
+pub(crate) fn record(
+    r: &mut Recorder<'_>,
+    frame: &mut Frame<'_>,
+    diffusion: &mut dyn Diffusion,
+) -> Result<Option<Image>, RenderError> {
+    frame.pose(r);
+    let light = frame.light(r);
+    diffusion.before_view(r, &frame.heads, &light);
+
+    let mut samples = Samples::default();
+    for subsample in frame.subsamples() {
+        let seen = frame.see(r, subsample);
+        let lit = frame.shade(r, &light, &seen, &samples);
+        let diffuse = diffusion.after_shading(r, &seen, &lit);
+        frame.show(r, &light, seen, lit, &diffuse, &mut samples);
+    }
+    frame.antialias(r, samples)
+}

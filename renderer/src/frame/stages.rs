@@ -1,0 +1,180 @@
+//! The stages that frames are made of.
+
+use super::Frame;
+use crate::channels::Channel;
+use crate::device::{Image, ImageSpec, Recorder};
+use crate::error::RenderError;
+use crate::passes::antialias::{self, History, Subsample};
+use crate::passes::shade::{Lighting, Lit};
+use crate::scene::lamp::{Illumination, place_lights};
+use crate::scene::placement::{average_light, pixels_per_mm, receivers};
+use crate::scene::view::{Seen, view};
+
+/// What the samples of a pixel have come to so far.
+#[derive(Default)]
+pub(crate) struct Samples {
+    seen: Vec<Seen>,
+    displayed: Vec<Image>,
+    /// The light of the last sample, which the next one may share.
+    lit: Option<Lit>,
+    velocity: Option<Image>,
+}
+
+impl<'a> Frame<'a> {
+    /// Blend shapes, tangent frames, blood and wrinkle weights.
+    pub(crate) fn pose(&self, r: &mut Recorder<'_>) {
+        self.passes.morph.record(r, &self.heads);
+        self.passes.tangent_frames.record(r, &self.heads);
+        self.passes.appearance.record(r, &self.heads, self.settings.quality.color);
+    }
+
+    /// Lamps with their shadow maps, and the environment.
+    pub(crate) fn light(&self, r: &mut Recorder<'_>) -> Illumination<'a> {
+        let seen = receivers(self.scene, self.settings.output.size, self.needs.margin, self.needs.backs);
+        let (lights, views) = place_lights(self.scene, &self.lamps, &seen);
+        let shadows = self.passes.shadow.record(r, &views, &self.heads, self.settings.quality.shadow_size);
+        Illumination {
+            lights,
+            shadows,
+            environment: self.scene.environment,
+            environment_intensity: self.scene.environment_intensity,
+            environment_rotation: self.scene.environment_rotation,
+        }
+    }
+
+    /// Places in a pixel at which this frame looks.
+    pub(crate) fn subsamples(&self) -> &'static [Subsample] {
+        self.settings.antialias().mode.subsamples(self.past.frames)
+    }
+
+    /// What the camera sees through one sample of each pixel.
+    pub(crate) fn see(&self, r: &mut Recorder<'_>, subsample: &Subsample) -> Seen {
+        let all = self.subsamples();
+        let share = 1.0 / all.len() as f32;
+        let shading_jitter = all
+            .iter()
+            .fold([0.0; 2], |sum, s| [sum[0] - share * s.position_px[0], sum[1] - share * s.position_px[1]]);
+        // A camera reaches a place in the pixel by moving the image the other way.
+        let jitters = [subsample.position_px.map(|p| -p), shading_jitter];
+        let size = self.settings.frame_size();
+        let view = view(self.scene, &self.lamps, size, jitters, self.past.clip_from_world);
+        let pixels_per_mm = pixels_per_mm(self.scene, &view);
+        let view = r.uniform("view", &view);
+        let [ids, depth] = self.passes.visibility.record(r, &view, &self.heads, size);
+        Seen { view, pixels_per_mm, ids, depth }
+    }
+
+    /// Light of what a sample sees. A second sample shares the light of the first where both see the same.
+    pub(crate) fn shade(
+        &self,
+        r: &mut Recorder<'_>,
+        light: &Illumination<'_>,
+        seen: &Seen,
+        samples: &Samples,
+    ) -> Lit {
+        let transmittance = self.passes.transmittance.as_ref().map(|(_, t)| t);
+        let first = samples.seen.first();
+        let lighting = Lighting { light, seen, first, transmittance, quality: &self.settings.quality };
+        self.passes.shade.record(r, &lighting, &self.heads, samples.lit.as_ref())
+    }
+
+    /// From the light of a sample to what a display shows of it: radiance, hair and films over it, resolve, display.
+    pub(crate) fn show(
+        &mut self,
+        r: &mut Recorder<'_>,
+        light: &Illumination<'_>,
+        seen: Seen,
+        lit: Lit,
+        diffuse: &Image,
+        samples: &mut Samples,
+    ) {
+        let passes = self.passes;
+        let inputs = [diffuse, &lit.albedo, &lit.direct, &seen.depth];
+        let hdr = passes.compose.record(r, self.scene.background_linear, inputs);
+        let is_first = samples.seen.is_empty();
+        let moves = is_first && self.settings.quality.antialias.is_temporal();
+        let velocity = moves.then(|| passes.velocity.record(r, &seen, &self.heads));
+        let hair = (&passes.fibre, light);
+        passes.cropped_hair.record(r, hair, &seen, &self.heads, &hdr, velocity.as_ref());
+        let ambient = average_light(self.scene);
+        passes.overlay.record(r, hair, ambient, &seen, &self.heads, &hdr, velocity.as_ref());
+
+        self.keep([
+            (Channel::Radiance, &hdr),
+            (Channel::Diffuse, diffuse),
+            (Channel::Irradiance, &lit.irradiance),
+            (Channel::Albedo, &lit.albedo),
+            (Channel::Direct, &lit.direct),
+            (Channel::Depth, &seen.depth),
+            (Channel::Ids, &seen.ids),
+        ]);
+        if let Some(velocity) = &velocity {
+            self.keep([(Channel::Velocity, velocity)]);
+        }
+        let look = &self.settings.look;
+        let resolved = passes.resolve.record(r, look, self.settings.samples_per_side(), hdr);
+        match self.into.filter(|_| passes.antialias.is_none()) {
+            Some(picture) => passes.display.record_into(r, look, &resolved, picture),
+            None => samples.displayed.push(passes.display.record(r, look, &resolved)),
+        }
+        samples.velocity = samples.velocity.take().or(velocity);
+        samples.seen.push(seen);
+        samples.lit = Some(lit);
+    }
+
+    /// The samples to one picture: the image that is returned, or where the frame was told to put it.
+    ///
+    /// # Errors
+    /// An input is missing.
+    pub(crate) fn antialias(
+        &mut self,
+        r: &mut Recorder<'_>,
+        samples: Samples,
+    ) -> Result<Option<Image>, RenderError> {
+        let size = self.settings.output.size;
+        let Some(antialias) = &self.passes.antialias else {
+            return Ok(samples.displayed.into_iter().next());
+        };
+        let colors: Vec<_> = samples.displayed.iter().map(Image::view).collect();
+        let depths: Vec<_> = samples.seen.iter().map(|s| s.depth.view()).collect();
+        let inputs = antialias::Inputs {
+            colors: &colors,
+            depths: if antialias.settings().needs_depth() { &depths } else { &[] },
+            velocity: samples.velocity.as_ref().map(Image::view),
+            frame: self.past.frames,
+        };
+        let is_temporal = self.settings.quality.antialias.is_temporal();
+        if is_temporal && self.past.history.is_none() {
+            self.past.history = Some(History::new(r.gpu, size));
+        }
+        let history = if is_temporal { self.past.history.as_mut() } else { None };
+        let picture = match self.into {
+            Some(_) => None,
+            None => Some(r.image("image", ImageSpec::storage(size, wgpu::TextureFormat::Rgba8Unorm))),
+        };
+        let output = picture.as_ref().map(Image::view).or(self.into);
+        if let Some(output) = output {
+            antialias.record(r.gpu, r.encoder, r.timer, &inputs, output, history)?;
+        }
+        if is_temporal {
+            for head in &self.heads {
+                let (from, to) = (head.positions, head.kept_positions);
+                r.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+            }
+            let camera = &self.scene.camera;
+            let aspect = size[0] as f32 / size[1] as f32;
+            self.past.clip_from_world = Some(camera.clip_from_view(aspect) * camera.view_from_world());
+            self.past.frames += 1;
+        }
+        Ok(picture)
+    }
+
+    /// Holds images that somebody wants to read, so that no later pass takes them over.
+    fn keep<'i>(&mut self, images: impl IntoIterator<Item = (Channel, &'i Image)>) {
+        for (channel, image) in images {
+            if self.settings.output.channels.contains(&channel) {
+                self.kept.insert(channel, image.clone());
+            }
+        }
+    }
+}

@@ -1,0 +1,347 @@
+//! `reference-surface:N`: the integral of the profile over the deformed surface.
+//!
+//! ```text
+//! positions --CPU: stratified by area, sorted into a grid--> samples --light_samples--> light of each
+//!        irradiance, depth, samples, light --gather, a batch at a time--> sums, squares --finish--> scattered
+//! ```
+//!
+//! Theory: radiant exitance is the integral of R(|x - y|) E(y) over the surface (Jensen et al. 2001 with a diffusion
+//! profile; papers/004 eq. 5.1 without the plane). E has the frame's own lights, shadows and maps; light that comes from
+//! behind, across gaps or around edges is in it, so frames with this method use no transmittance.
+//!
+//! Inside of a millimetre the surface counts as flat: there the integral is the light of a disk times E(x), plus the
+//! sampled difference of E (a control variate; without it the steep centre of R would be nearly all noise).
+//!
+//! The error falls at least as 1 / sqrt(N); the spread of the batches gives an estimate of it.
+//!
+//! Does not: see skin outside of the picture's frame by more than the kernel, average light over a pixel.
+
+use glam::{Mat4, Vec3};
+use rubor_rig::head::Material;
+use rubor_rig::skin::profile::Profile;
+
+use crate::device::readback::Readback;
+use crate::device::wgsl::{Module, Program, module};
+use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
+use crate::error::RenderError;
+use crate::passes::diffusion::Needs;
+use crate::passes::pixel_groups;
+use crate::passes::shade::Lit;
+use crate::scene::view::Seen;
+
+#[cfg(test)]
+mod tests;
+
+/// Samples of a batch.
+pub(crate) const BATCH: usize = 65_536;
+/// Entries of the table of R.
+const ENTRIES: usize = 4096;
+/// Share of the widest channel's light inside of the kernel.
+const COVERAGE: f64 = 0.9999;
+/// Radius inside of which the surface counts as flat, mm; ears and lids are thicker.
+const NEAR_MM: f64 = 1.0;
+/// Strength from which a pixel counts as bare skin. Under hair it is lower: kernels are narrow there, few samples meet
+/// them, and what noise is left is not that of skin.
+pub const BARE_SKIN: f32 = 0.5;
+/// Cells of the grid in the radius of the kernel.
+const CELLS_PER_RADIUS: f32 = 2.0;
+/// Most cells of a grid; larger ones grow their cells.
+const MOST_CELLS: f32 = 4e6;
+
+const SHADER: Module = module!("reference_surface", "surface.wesl");
+
+/// The shader of the passes.
+pub(crate) fn program() -> Program {
+    Program::new(SHADER)
+}
+
+/// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
+const PICTURE_MARGIN: f32 = 1.25;
+
+/// What the frame has to prepare: the integral sees backs and surroundings, and holds the light through thin parts.
+pub(crate) const NEEDS: Needs = Needs { backs: true, margin: PICTURE_MARGIN, transmittance: false };
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Params {
+    pub(crate) origin: [f32; 3],
+    pub(crate) head: u32,
+    pub(crate) cells: [u32; 3],
+    pub(crate) cell_mm: f32,
+    pub(crate) half_width_mm: f32,
+    pub(crate) near_mm: f32,
+    pub(crate) sample_mm2: f32,
+    pub(crate) batches: f32,
+    pub(crate) near_light: [f32; 4],
+}
+
+/// A sample as the shaders read it.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct SurfaceSample {
+    pub(crate) place: [f32; 4],
+    pub(crate) barycentric: [f32; 4],
+}
+
+/// Skin triangles of a head that the picture can need.
+pub(crate) struct Skin {
+    /// Index in the head's list, and corners in world space, metres.
+    triangles: Vec<(u32, [Vec3; 3])>,
+    /// Sums of areas up to and with each triangle, mm^2.
+    area_mm2: Vec<f64>,
+    origin: Vec3,
+    size: Vec3,
+}
+
+/// A batch of samples, sorted by cell.
+pub(crate) struct Batch {
+    pub(crate) samples: Vec<SurfaceSample>,
+    pub(crate) starts: Vec<u32>,
+}
+
+/// The grid of a head.
+#[derive(Clone, Copy)]
+struct Grid {
+    cells: [u32; 3],
+    cell_mm: f32,
+}
+
+impl Skin {
+    /// Chooses triangles (three vertices and a material each) that are in the picture or as far outside as light comes in
+    /// from.
+    pub(crate) fn new(
+        triangles: &[[u32; 4]],
+        point_of_vertex: &[u32],
+        points: &[Vec3],
+        clip_from_world: &Mat4,
+    ) -> Self {
+        let skin = Material::Skin.number();
+        // Beyond one side of the widened picture with all corners, and before the camera.
+        let is_outside = |corners: &[Vec3; 3]| {
+            let c = corners.map(|p| *clip_from_world * p.extend(1.0));
+            let beyond =
+                |f: &dyn Fn(glam::Vec4) -> f32| c.iter().all(|c| c.w > 0.0 && f(*c) > PICTURE_MARGIN * c.w);
+            beyond(&|c| c.x) || beyond(&|c| -c.x) || beyond(&|c| c.y) || beyond(&|c| -c.y)
+        };
+        let mut chosen = Vec::new();
+        let (mut area_mm2, mut sum) = (Vec::new(), 0.0);
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for (i, t) in triangles.iter().enumerate().filter(|(_, t)| t[3] == skin) {
+            let corners = [t[0], t[1], t[2]].map(|v| points[point_of_vertex[v as usize] as usize]);
+            if is_outside(&corners) {
+                continue;
+            }
+            let cross = (corners[1] - corners[0]).as_dvec3().cross((corners[2] - corners[0]).as_dvec3());
+            sum += 0.5e6 * cross.length();
+            chosen.push((i as u32, corners));
+            area_mm2.push(sum);
+            for c in corners {
+                (low, high) = (low.min(c), high.max(c));
+            }
+        }
+        Self { triangles: chosen, area_mm2, origin: low, size: high - low }
+    }
+
+    /// Area, mm^2.
+    fn total_mm2(&self) -> f64 {
+        self.area_mm2.last().copied().unwrap_or(0.0)
+    }
+
+    fn grid(&self, half_width_mm: f32) -> Grid {
+        let mut cell_mm = half_width_mm / CELLS_PER_RADIUS;
+        let most = (1e3 * self.size + cell_mm) / cell_mm;
+        cell_mm *= (most.x * most.y * most.z / MOST_CELLS).cbrt().max(1.0);
+        let cells = (1e3 * self.size / cell_mm).floor().as_uvec3() + 1;
+        Grid { cells: cells.to_array(), cell_mm }
+    }
+
+    /// Samples of batch number `batch`: evenly along the sum of areas, so that each triangle has its share to within
+    /// one sample, at random places of the triangle.
+    fn batch(&self, batch: u32, count: usize, grid: &Grid) -> Batch {
+        let mut random = Random(0x9E37_79B9_7F4A_7C15 ^ (u64::from(batch) << 32));
+        let step = self.total_mm2() / count as f64;
+        let shift = random.next();
+        let mut triangle = 0;
+        let mut cells = Vec::with_capacity(count);
+        let mut unsorted = Vec::with_capacity(count);
+        for i in 0..count {
+            let at = (i as f64 + shift) * step;
+            while triangle + 1 < self.triangles.len() && self.area_mm2[triangle] < at {
+                triangle += 1;
+            }
+            let (index, corners) = self.triangles[triangle];
+            // Uniform over the triangle: the square folded along its diagonal.
+            let (mut u, mut v) = (random.next() as f32, random.next() as f32);
+            if u + v > 1.0 {
+                (u, v) = (1.0 - u, 1.0 - v);
+            }
+            let world = corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
+            let mm = 1e3 * (world - self.origin);
+            let cell: [u32; 3] =
+                std::array::from_fn(|a| ((mm[a] / grid.cell_mm).max(0.0) as u32).min(grid.cells[a] - 1));
+            cells.push((cell[2] * grid.cells[1] + cell[1]) * grid.cells[0] + cell[0]);
+            unsorted.push(SurfaceSample {
+                place: [mm.x, mm.y, mm.z, f32::from_bits(index)],
+                barycentric: [u, v, 0.0, 0.0],
+            });
+        }
+        let cell_count = grid.cells.iter().product::<u32>() as usize;
+        let mut starts = vec![0u32; cell_count + 1];
+        for c in &cells {
+            starts[*c as usize + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut samples: Vec<SurfaceSample> = vec![bytemuck::Zeroable::zeroed(); count];
+        for (c, s) in cells.iter().zip(&unsorted) {
+            samples[next[*c as usize] as usize] = *s;
+            next[*c as usize] += 1;
+        }
+        Batch { samples, starts }
+    }
+}
+
+/// splitmix64: 0 to 1.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// The passes and sums of one sample of a frame.
+pub(crate) struct Surface {
+    gather: Kernel,
+    finish: Kernel,
+    profile: wgpu::Buffer,
+    half_width_mm: f64,
+    near_light: [f32; 4],
+    sums: wgpu::Buffer,
+    squares: wgpu::Buffer,
+}
+
+impl Surface {
+    pub(crate) fn new(gpu: &Gpu, profile: &Profile, size: [u32; 2]) -> Self {
+        let half_width_mm = profile.channels.iter().map(|c| c.sample_radius(COVERAGE)).fold(0.0, f64::max);
+        let near_mm = NEAR_MM.min(half_width_mm);
+        let total = profile.total();
+        let table: Vec<[f32; 4]> = (0..ENTRIES)
+            .map(|i| {
+                // Half an entry instead of 0, where R may be infinite.
+                let x = (i as f64).max(0.5) / (ENTRIES - 1) as f64;
+                let r = profile.reflectance(half_width_mm * x * x);
+                let [r, g, b] = [0, 1, 2].map(|c| (r[c] / total[c]) as f32);
+                [r, g, b, 0.0]
+            })
+            .collect();
+        let near = profile.cdf(near_mm).map(|l| l as f32);
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        Self {
+            gather: Kernel::new(gpu, "reference-surface", &program(), "gather"),
+            finish: Kernel::new(gpu, "reference-surface", &program(), "finish"),
+            profile: gpu.storage("profile", &table),
+            half_width_mm,
+            near_light: [near[0], near[1], near[2], 0.0],
+            sums: gpu.storage_zeroed("sums", 16 * pixels),
+            squares: gpu.storage_zeroed("squares", 16 * pixels),
+        }
+    }
+
+    /// Adds batch number `batch` of one head. `light` records the pass that finds the light of samples.
+    pub(crate) fn record_batch(
+        &self,
+        r: &mut Recorder<'_>,
+        (seen, lit): (&Seen, &Lit),
+        (head, skin): (u32, &Skin),
+        batch: u32,
+        light: &dyn Fn(&mut Recorder<'_>, &wgpu::Buffer, &wgpu::Buffer),
+    ) {
+        if skin.total_mm2() <= 0.0 {
+            return;
+        }
+        let grid = skin.grid(self.half_width_mm as f32);
+        let Batch { samples, starts } = skin.batch(batch, BATCH, &grid);
+        let params = Params {
+            origin: skin.origin.to_array(),
+            head,
+            cells: grid.cells,
+            cell_mm: grid.cell_mm,
+            half_width_mm: self.half_width_mm as f32,
+            near_mm: NEAR_MM.min(self.half_width_mm) as f32,
+            sample_mm2: (skin.total_mm2() / BATCH as f64) as f32,
+            batches: batch as f32,
+            near_light: self.near_light,
+        };
+        let params = r.uniform("reference-surface", &params);
+        let samples = r.gpu.storage("surface samples", &samples);
+        let sample_light = r.gpu.storage_zeroed("sample light", 16 * BATCH as u64);
+        let starts = r.gpu.storage("cell starts", &starts);
+        light(r, &samples, &sample_light);
+        let resources = [
+            ("view", seen.view.bound()),
+            ("params", params.bound()),
+            ("visible", seen.ids.bound()),
+            ("irradiance", lit.irradiance.bound()),
+            ("albedo", lit.albedo.bound()),
+            ("depth", seen.depth.bound()),
+            ("profile", self.profile.bound()),
+            ("starts", starts.bound()),
+            ("samples", samples.bound()),
+            ("light", sample_light.bound()),
+            ("sums", self.sums.bound()),
+            ("squares", self.squares.bound()),
+        ];
+        r.dispatch(&self.gather, &resources, pixel_groups(lit.irradiance.size()));
+    }
+
+    /// The mean of all batches; unscattered pixels keep their light.
+    pub(crate) fn record_finish(&self, r: &mut Recorder<'_>, seen: &Seen, lit: &Lit) -> Image {
+        let size = lit.irradiance.size();
+        let scattered = r.image("scattered", ImageSpec::light(size));
+        let resources = [
+            ("view", seen.view.bound()),
+            ("irradiance", lit.irradiance.bound()),
+            ("sums", self.sums.bound()),
+            ("scattered", scattered.bound()),
+        ];
+        r.dispatch(&self.finish, &resources, pixel_groups(size));
+        scattered
+    }
+
+    /// Copies of the sums and of the sums of squares, for [`relative_noise`].
+    pub(crate) fn read_sums(&self, r: &mut Recorder<'_>) -> [Readback; 2] {
+        [&self.sums, &self.squares].map(|buffer| Readback::of_buffer(r.gpu, r.encoder, buffer))
+    }
+}
+
+/// Root mean square standard error of the mean over that of the result, all channels of all pixels of bare skin; nothing
+/// from fewer than two batches.
+///
+/// # Errors
+/// The device failed.
+pub(crate) async fn relative_noise([sums, squares]: [Readback; 2]) -> Result<Option<f64>, RenderError> {
+    let sums: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&sums.read().await?);
+    let squares: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&squares.read().await?);
+    let (mut error, mut signal) = (0.0, 0.0);
+    for (s, q) in sums.iter().zip(&squares) {
+        let n = f64::from(s[3]);
+        // The fourth sum of squares is that of the strength.
+        if n < 2.0 || f64::from(q[3]) < f64::from(BARE_SKIN) * n {
+            continue;
+        }
+        for c in 0..3 {
+            let mean = f64::from(s[c]) / n;
+            let variance = (f64::from(q[c]) / n - mean * mean).max(0.0) / (n - 1.0);
+            error += variance;
+            signal += mean * mean;
+        }
+    }
+    Ok((signal > 0.0).then(|| (error / signal).sqrt()))
+}

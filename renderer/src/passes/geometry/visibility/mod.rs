@@ -1,0 +1,152 @@
+//! The visibility buffer: which triangle of which head each pixel sees.
+//!
+//! ```text
+//! positions, camera --visibility--> id (r32uint: head << 27 | triangle + 1, 0 = nothing), depth (reversed, infinite)
+//! ```
+//!
+//! Theory: Burns and Hunt 2013, "The visibility buffer". The only rasterised pass of the frame that covers the head;
+//! its fragment shader stores one integer, everything else is compute (see ARCHITECTURE.md for what that saves).
+//! Reversed infinite depth keeps 24 bits at any distance (Lapidous and Jiao 1999).
+
+use crate::device::wgsl::{Module, Program, module};
+use crate::device::{
+    Attachments, Bind, Draw, Gpu, Image, ImageSpec, Raster, RasterKernel, Recorder, color_attachment,
+    depth_attachment,
+};
+use crate::scene::PosedHead;
+
+const SHADER: Module = module!("visibility", "visibility.wesl");
+
+/// The shader of the pass, for a device that numbers triangles or for one that does not.
+pub(crate) fn program(numbered: bool) -> Program {
+    Program::new(SHADER).flag("numbered", numbered)
+}
+
+/// Its entry points.
+pub(crate) fn entries(numbered: bool) -> [&'static str; 2] {
+    match numbered {
+        true => ["numbered_vertex", "numbered_fragment"],
+        false => ["cornered_vertex", "cornered_fragment"],
+    }
+}
+
+/// The pipeline of the pass.
+pub(crate) struct Visibility {
+    kernel: RasterKernel,
+    is_numbered: bool,
+}
+
+impl Visibility {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        Self::with_numbers(gpu, gpu.device.features().contains(wgpu::Features::PRIMITIVE_INDEX))
+    }
+
+    /// Both ways give the same image.
+    pub(crate) fn with_numbers(gpu: &Gpu, is_numbered: bool) -> Self {
+        let [vertex, fragment] = entries(is_numbered);
+        let kernel = RasterKernel::new(
+            gpu,
+            &Raster {
+                label: "visibility",
+                program: program(is_numbered),
+                vertex,
+                fragment: Some(fragment),
+                targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
+                nearer: wgpu::CompareFunction::Greater,
+                writes_depth: true,
+            },
+        );
+        Self { kernel, is_numbered }
+    }
+
+    /// Draws the opaque triangles of all heads: ids and depth.
+    pub(crate) fn record(
+        &self,
+        r: &mut Recorder<'_>,
+        view: &wgpu::Buffer,
+        heads: &[PosedHead<'_>],
+        size: [u32; 2],
+    ) -> [Image; 2] {
+        let ids = r.image("ids", ImageSpec::attachment(size, wgpu::TextureFormat::R32Uint));
+        let depth = r.image("depth", ImageSpec::attachment(size, wgpu::TextureFormat::Depth32Float));
+        let numbers: Vec<_> = heads.iter().map(|h| r.uniform("head", &[h.index, 0, 0, 0])).collect();
+        let each = heads.iter().zip(&numbers).map(|(h, number)| {
+            let resources = vec![
+                ("view", view.bound()),
+                ("positions", h.positions.bound()),
+                ("head", number.bound()),
+                ("points", h.head.opaque_points.bound()),
+            ];
+            let corners = h.head.opaque_triangles * 3;
+            let draw = match self.is_numbered {
+                true => Draw::Indexed(&h.head.opaque_points, corners),
+                false => Draw::Corners(corners),
+            };
+            (resources, draw)
+        });
+        let attachments = Attachments {
+            colors: vec![color_attachment(ids.view(), wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT))],
+            depth: depth_attachment(depth.view(), wgpu::LoadOp::Clear(0.0)),
+        };
+        r.draw_each(&self.kernel, attachments, each);
+        [ids, depth]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Mat4, Vec3};
+    use rubor_rig::face_state::FaceState;
+
+    use super::*;
+    use crate::scene::posed_head::{Instance, posed};
+    use crate::scene::view::View;
+    use crate::testing::{gpu, read_image, recorded};
+    use crate::tests::{WHITE_TABLE, dome};
+    use crate::{Camera, HeadInstance, HeadOnGpu, Scene};
+
+    #[test]
+    fn triangles_are_the_same_whoever_numbers_them() {
+        let Some(gpu) = gpu() else { return };
+        if !gpu.device.features().contains(wgpu::Features::PRIMITIVE_INDEX) {
+            eprintln!("SKIPPED: this device does not number triangles");
+            return;
+        }
+        let head = dome();
+        let on_gpu = HeadOnGpu::new(gpu, &head, &WHITE_TABLE).expect("the dome uploads");
+        let state = FaceState::neutral(&head);
+        let placed =
+            [0, 1].map(|_| HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY });
+        let scene = Scene {
+            heads: &placed,
+            camera: Camera { position: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 },
+            lights: &[],
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+        };
+        let instances = [0, 1].map(|_| Instance::new(gpu, &on_gpu));
+        let points: Vec<[f32; 4]> = head.mesh.points.iter().map(|p| p.extend(1.0).to_array()).collect();
+        for instance in &instances {
+            gpu.queue.write_buffer(&instance.positions, 0, bytemuck::cast_slice(&points));
+        }
+        let heads = posed(&scene, &instances, false);
+        let mut view: View = bytemuck::Zeroable::zeroed();
+        view.clip_from_world = Mat4::from_scale(Vec3::new(5.0, 5.0, 0.5));
+        view.size = [64, 64];
+        view.jitter = [0.25, -0.25];
+        let view = gpu.uniform("view", &view);
+        let draw = |numbered| {
+            let pass = Visibility::with_numbers(gpu, numbered);
+            let [ids, _] = recorded(gpu, |r| pass.record(r, &view, &heads, [64, 64]));
+            read_image::<u32>(gpu, &ids)
+        };
+        let (numbered, by_corners) = (draw(true), draw(false));
+        assert_eq!(numbered, by_corners);
+        let mut seen: Vec<u32> = numbered.into_iter().filter(|id| *id != 0).collect();
+        seen.sort_unstable();
+        seen.dedup();
+        assert!(seen.len() > 10, "{} triangles are seen", seen.len());
+    }
+}

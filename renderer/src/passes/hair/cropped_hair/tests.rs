@@ -1,0 +1,137 @@
+use glam::{Mat4, Quat};
+use rubor_rig::face_state::FaceState;
+use rubor_rig::head::{Material, Part, Vertex};
+use rubor_rig::map::Map;
+
+use super::*;
+use crate::channels::Channel;
+use crate::scene::hair_roots::{self, Root};
+use crate::settings::AntialiasMethod;
+use crate::testing::{assert_layout, assert_raster, offsets};
+use crate::tests::{WHITE_TABLE, dome, lamp, read, render, renderer, settings};
+use crate::{Camera, HeadInstance, HeadOnGpu, Scene};
+
+/// The dome with hair on the half of its texture where v is under one half, and its triangles.
+fn half_haired() -> (rubor_rig::head::Head, Vec<[u32; 4]>) {
+    let mut head = dome();
+    let side = 64;
+    let mut hair = Map::filled(side, side, &[0.0]);
+    hair.values[..(side * side / 2) as usize].fill(0.9);
+    head.maps.hair = Some(hair);
+    let triangles = head.mesh.triangles.iter().map(|t| [t[0], t[1], t[2], 0]).collect();
+    (head, triangles)
+}
+
+#[test]
+fn shader_is_valid_and_laid_out_as_here() {
+    assert_raster(&program(), &["cropped_hair_vertex", "cropped_hair_fragment"]);
+    let entry = "cropped_hair_vertex";
+    assert_layout(&program(), entry, "Params", size_of::<Params>(), &offsets!(Params; color as "color"));
+    assert_layout(
+        &program(),
+        entry,
+        "Root",
+        size_of::<Root>(),
+        &offsets!(Root; triangle as "triangle", weights as "weights", flow as "flow", look as "look"),
+    );
+}
+
+#[test]
+fn hairs_stand_where_the_map_has_hair_and_flow_along_the_skin() {
+    let (head, triangles) = half_haired();
+    let roots = hair_roots::roots(&head, &triangles);
+    assert!(roots.len() > 1000, "{}", roots.len());
+    let unorm = |v: u32| [v & 0xffff, v >> 16].map(|h| h as f32 / 65535.0);
+    for root in &roots {
+        let corners = triangles[root.triangle as usize];
+        let of = |i: usize| head.mesh.vertices[corners[i] as usize];
+        let point = |i: usize| head.mesh.points[of(i).point as usize];
+        let [x, y] = unorm(root.weights);
+        let v = x * of(0).uv.y + y * of(1).uv.y + (1.0 - x - y) * of(2).uv.y;
+        // Bilinear fetches reach over by a texel.
+        assert!(v < 0.5 + 1.0 / 64.0, "a hair at v = {v}");
+        let halves = [root.flow as u16, (root.flow >> 16) as u16].map(|b| half::f16::from_bits(b).to_f32());
+        let flow = halves[0] * (point(1) - point(0)) + halves[1] * (point(2) - point(0));
+        assert!((flow.length() - 1.0).abs() < 0.01, "{flow}");
+        assert!(unorm(root.look)[0] > 0.2);
+    }
+    assert_eq!(roots, hair_roots::roots(&head, &triangles), "the same head has the same hairs");
+}
+
+#[test]
+fn strands_keep_their_skin_and_bald_heads_have_no_hair() {
+    let (mut head, triangles) = half_haired();
+    let all = hair_roots::roots(&head, &triangles);
+    // A strand somewhere on the haired half.
+    let corners = triangles[all[0].triangle as usize];
+    let point = head.mesh.vertices[corners[0] as usize].point;
+    let first = head.mesh.vertices.len() as u32;
+    for k in 0..3 {
+        let uv = glam::Vec2::new(2.0, k as f32 / 2.0);
+        head.mesh.vertices.push(Vertex { point, uv });
+    }
+    let end = head.mesh.triangles.len() as u32;
+    head.mesh.triangles.push([first, first + 1, first + 2]);
+    head.mesh.parts.push(Part { name: "brow".into(), material: Material::Hair, triangles: end..end + 1 });
+    let fewer = hair_roots::roots(&head, &triangles);
+    assert!(fewer.len() < all.len() && !fewer.is_empty(), "{} and {}", fewer.len(), all.len());
+    head.maps.hair = None;
+    assert_eq!(hair_roots::roots(&head, &triangles), []);
+}
+
+#[test]
+fn a_hair_moves_with_its_root() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    // 21 mm of the lower edge of the dome, seen from so far that depth hardly matters: a hair is 1.7 pixels wide.
+    let edge = Vec3::new(0.0, -0.08, 0.0358);
+    let distance = 0.6;
+    let size = 256u32;
+    let fov_degrees = 2.0 * (0.0105f32 / distance).atan().to_degrees();
+    let pixels_per_metre = size as f32 / 0.021;
+    let mut settings = settings([size; 2]);
+    settings.quality.antialias = AntialiasMethod::SmaaT2x;
+    // The head nods sideways about the axis of the camera; the edge stands still but for that.
+    let turn = 0.002f32;
+    for angle in [0.0, turn] {
+        let mut state = FaceState::neutral(&head);
+        state.head_rotation = Quat::from_rotation_z(angle);
+        let heads = [HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }];
+        let scene = Scene {
+            heads: &heads,
+            camera: Camera { position: edge + distance * Vec3::Z, target: edge, up: Vec3::Y, fov_degrees },
+            lights: &[lamp()],
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+        };
+        render(&mut renderer, &scene, &settings).expect("it draws");
+    }
+    let velocity: Vec<[f32; 2]> = read(&renderer, Channel::Velocity).texels().collect();
+    let root_pixels = 2.0 * (0.5 * turn).sin() * 0.08 * pixels_per_metre;
+    let (mut hairs, mut farthest_mm) = (0, 0.0f32);
+    // Below the edge there is only hair before a background that stands still.
+    for y in size / 2 + 4..size {
+        for x in 96..160 {
+            let [right, down] = velocity[(y * size + x) as usize];
+            if right == 0.0 && down == 0.0 {
+                continue;
+            }
+            hairs += 1;
+            farthest_mm = farthest_mm.max((y as f32 - size as f32 / 2.0) / pixels_per_metre * 1e3);
+            // Roots lie on the edge or up to 6 mm above; where blended hairs leave some of the background it stands still.
+            assert!(right < 1.01 * root_pixels && right > 0.0, "{right} of {root_pixels} at {x}, {y}");
+            assert!(down.abs() < 0.08 * root_pixels, "{down} at {x}, {y}");
+        }
+    }
+    let full = (size / 2 + 4..size)
+        .flat_map(|y| (96..160).map(move |x| (x, y)))
+        .filter(|(x, y)| velocity[(y * size + x) as usize][0] > 0.9 * root_pixels)
+        .count();
+    assert!(hairs > 200 && full > hairs / 2, "{hairs} pixels of hair, {full} with all of the motion");
+    // A tip three millimetres out would move by 4 % more.
+    assert!(farthest_mm > 3.0, "hair up to {farthest_mm} mm");
+}

@@ -1,0 +1,115 @@
+//! Lashes, hair cards and wet films: the only blended triangles of a frame, drawn over the composed picture.
+//!
+//! ```text
+//! positions, frames, light, depth (tested, not written), hdr --overlay--> hdr, velocity (premultiplied over)
+//! ```
+//!
+//! Motion is mixed with that of what lies behind as colours are: where hair moves before a background that stands
+//! still, history would otherwise be taken from beside the hair.
+//!
+//! A strand of hair is a fraction of a pixel wide: its coverage is computed from its width, so it fades instead of
+//! flickering, and its light is that of `fibre` at each vertex. `uv` of [`rubor_rig::head::Material::Lash`] says where along the lid and along the strand.
+//!
+//! Does not: sort (hair is dark on dark, a film only adds light), cast shadows.
+
+use glam::Vec3;
+use rubor_rig::head::Material;
+
+use crate::device::wgsl::{Module, Program, module};
+use crate::device::{Bind, Draw, Gpu, Image, Raster, RasterKernel, Recorder};
+use crate::passes::hair::fibre::{self, Fibre};
+use crate::passes::hair::{blended, drawn_over};
+use crate::scene::PosedHead;
+use crate::scene::lamp::Illumination;
+use crate::scene::view::Seen;
+
+const SHADER: Module = module!("overlay", "overlay.wesl");
+
+/// The shader of the pass.
+pub(crate) fn program() -> Program {
+    Program::new(SHADER)
+        .with(&fibre::MODULES)
+        .constant("LASH", Material::Lash.number())
+        .constant("HAIR", Material::Hair.number())
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Params {
+    pub(crate) ambient: [f32; 4],
+    pub(crate) first: u32,
+    pub(crate) padding: [u32; 3],
+    pub(crate) hair: [f32; 4],
+}
+
+/// The pipelines of the pass.
+pub(crate) struct Overlay {
+    /// Colour only, and colour with motion.
+    kernels: [RasterKernel; 2],
+}
+
+impl Overlay {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        let targets = [Some(blended()), Some(blended())];
+        let kernel = |targets: &[Option<wgpu::ColorTargetState>]| {
+            RasterKernel::new(
+                gpu,
+                &Raster {
+                    label: "overlay",
+                    program: program(),
+                    vertex: "overlay_vertex",
+                    fragment: Some("overlay_fragment"),
+                    targets,
+                    nearer: wgpu::CompareFunction::Greater,
+                    writes_depth: false,
+                },
+            )
+        };
+        Self { kernels: [kernel(&targets[..1]), kernel(&targets)] }
+    }
+
+    /// Draws the blended triangles of heads over a picture and, where there is one, over its motion. `ambient` is the
+    /// irradiance / pi that cards and films see on average.
+    pub(crate) fn record(
+        &self,
+        r: &mut Recorder<'_>,
+        (fibre, light): (&Fibre, &Illumination<'_>),
+        ambient: Vec3,
+        seen: &Seen,
+        heads: &[PosedHead<'_>],
+        hdr: &Image,
+        velocity: Option<&Image>,
+    ) {
+        let drawn: Vec<_> = heads.iter().filter(|h| h.head.overlay_triangles > 0).collect();
+        if drawn.is_empty() {
+            return;
+        }
+        let hair_light = fibre.params(r, light);
+        let params = drawn.iter().map(|h| {
+            let hair = h.head.maps.as_ref().map_or([0.03; 3], |m| m.hair_color_linear);
+            let params = Params {
+                ambient: ambient.extend(0.0).to_array(),
+                first: h.head.opaque_triangles,
+                padding: [0; 3],
+                hair: Vec3::from(hair).extend(1.0).to_array(),
+            };
+            r.uniform("overlay", &params)
+        });
+        let params: Vec<_> = params.collect();
+        let each = drawn.iter().zip(&params).map(|(h, params)| {
+            let mut resources = vec![
+                ("view", seen.view.bound()),
+                ("params", params.bound()),
+                ("positions", h.positions.bound()),
+                ("vertices", h.head.vertices.bound()),
+                ("triangles", h.head.triangles.bound()),
+                ("frames", h.tangent_frames.bound()),
+                ("previous_positions", h.previous_positions.bound()),
+            ];
+            resources.extend(fibre.resources(&hair_light, light));
+            (resources, Draw::Corners(h.head.overlay_triangles * 3))
+        });
+        let kernel = &self.kernels[usize::from(velocity.is_some())];
+        r.draw_each(kernel, drawn_over(hdr, velocity, &seen.depth), each);
+    }
+}

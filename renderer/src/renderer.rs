@@ -1,0 +1,445 @@
+//! Draws scenes.
+
+use std::collections::BTreeMap;
+use std::collections::VecDeque;
+
+use serde::Serialize;
+
+use crate::channels::{Channel, ChannelData};
+use crate::device::readback::TextureReadback;
+use crate::device::{FrameTimes, Gpu, Image as FrameImage, Images, PassTimer, PendingTimes, Recorder};
+use crate::error::RenderError;
+use crate::frame::{Frame, Passes, Past, realtime, reference};
+use crate::passes::antialias::{self, Antialias, History};
+use crate::passes::diffusion::{Needs, Prepared, surface};
+use crate::scene::lamp::lamps;
+use crate::scene::posed_head::{Instance, posed};
+use crate::scene::{MAX_HEADS, MAX_LIGHTS, Scene};
+use crate::settings::{ScatterMethod, Settings};
+
+/// A picture, rows from the top.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// RGBA, sRGB transfer, opaque.
+    pub rgba: Vec<u8>,
+}
+
+/// What a frame cost.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FrameStats {
+    /// GPU milliseconds of each pass, in order; empty where the adapter has no timestamps.
+    pub passes_ms: Vec<(&'static str, f64)>,
+    /// Triangles of all heads.
+    pub triangles: u64,
+    /// Bytes of heads, buffers and images on the device.
+    pub memory_bytes: u64,
+    /// Relative standard error of the diffuse light, for methods that draw samples.
+    pub scatter_noise: Option<f64>,
+}
+
+/// Frames that [`Renderer::measure`] hands to the device before it waits: enough to keep it busy.
+const FRAMES_IN_FLIGHT: usize = 3;
+
+/// Draws scenes. Keeps pipelines, and images while frames ask for them; of frames only what antialiasing over time needs.
+pub struct Renderer {
+    gpu: Gpu,
+    passes: Passes,
+    diffusion: Prepared,
+    instances: Vec<Instance>,
+    images: Images,
+    timer: PassTimer,
+    past: Past,
+    /// What the past belongs to.
+    past_shape: Option<([u32; 2], [u32; 2], antialias::Settings)>,
+    checked: Option<Settings>,
+    /// Channels of the last frame.
+    kept: BTreeMap<Channel, FrameImage>,
+}
+
+/// A frame that was handed to the device.
+pub struct Drawn {
+    gpu: Gpu,
+    submission: wgpu::SubmissionIndex,
+    picture: TextureReadback,
+    times: PendingTimes,
+    stats: FrameStats,
+}
+
+impl Drawn {
+    /// The picture and what it cost, once the device is done with it.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub async fn finish(self) -> Result<(Image, FrameStats), RenderError> {
+        self.gpu.wants(self.submission);
+        let [width, height] = self.picture.size;
+        let rgba = self.picture.read().await?;
+        let passes_ms = self.times.read().await?.passes_ms;
+        self.gpu.check()?;
+        Ok((Image { width, height, rgba }, FrameStats { passes_ms, ..self.stats }))
+    }
+}
+
+impl Renderer {
+    /// Compiles the passes.
+    ///
+    /// # Errors
+    /// The device refused a pipeline.
+    pub fn new(gpu: Gpu) -> Result<Self, RenderError> {
+        let renderer = Self {
+            passes: Passes::new(&gpu),
+            diffusion: Prepared::default(),
+            instances: Vec::new(),
+            images: Images::default(),
+            timer: PassTimer::default(),
+            past: Past::default(),
+            past_shape: None,
+            checked: None,
+            kept: BTreeMap::new(),
+            gpu,
+        };
+        renderer.gpu.check()?;
+        Ok(renderer)
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Forgets the previous frame: call it at a cut, so that antialiasing over time mixes nothing into the next one.
+    /// `frame` is the number of the next frame: even and odd ones have their samples at other places.
+    pub fn cut(&mut self, frame: u64) {
+        self.past = Past { frames: frame, ..Past::default() };
+    }
+
+    /// Records a frame into commands of the caller, its picture into a texture of the caller: `Rgba8Unorm`, of the size in
+    /// the settings, usable as storage. Nothing is submitted and nothing is waited for. Frames follow one another until
+    /// [`Renderer::cut`]; the commands have to be submitted in their order.
+    ///
+    /// # Errors
+    /// A size, a count or a value outside the limits; a method that does not draw in one go; a texture that does not fit.
+    pub fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        into: &wgpu::Texture,
+    ) -> Result<(), RenderError> {
+        let [width, height] = settings.output.size;
+        if [into.width(), into.height()] != [width, height]
+            || into.format() != wgpu::TextureFormat::Rgba8Unorm
+            || !into.usage().contains(wgpu::TextureUsages::STORAGE_BINDING)
+        {
+            return Err(RenderError::Limit {
+                what: "texture for the picture",
+                found: format!("{:?}, {}x{}, {:?}", into.format(), into.width(), into.height(), into.usage()),
+                expected: format!("expected Rgba8Unorm, {width}x{height}, with STORAGE_BINDING"),
+            });
+        }
+        let view = into.create_view(&Default::default());
+        self.prepare(scene, settings)?;
+        self.record_frame(encoder, scene, settings, Some(&view))?;
+        Ok(())
+    }
+
+    /// Draws a scene and waits for nothing: the next frame can be drawn while this one is read. Frames follow one another
+    /// until [`Renderer::cut`].
+    ///
+    /// # Errors
+    /// A size, a count or a value outside the limits; a method that does not draw in one go.
+    pub fn draw(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<Drawn, RenderError> {
+        self.prepare(scene, settings)?;
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let image = self.record_frame(&mut encoder, scene, settings, None)?;
+        self.hand_over(encoder, scene, image, None)
+    }
+
+    /// Draws a scene with any method. Frames follow one another until [`Renderer::cut`].
+    ///
+    /// # Errors
+    /// A size, a count or a value outside the limits; the device failed.
+    pub async fn render(
+        &mut self,
+        scene: &Scene<'_>,
+        settings: &Settings,
+    ) -> Result<(Image, FrameStats), RenderError> {
+        let ScatterMethod::ReferenceSurface(batches) = settings.quality.scatter else {
+            return self.draw(scene, settings)?.finish().await;
+        };
+        self.prepare(scene, settings)?;
+        self.passes.shade.prepare_samples(&self.gpu);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.images.begin_frame();
+        self.timer.restart();
+        let mut r = Recorder {
+            gpu: &self.gpu,
+            encoder: &mut encoder,
+            timer: &mut self.timer,
+            images: &mut self.images,
+        };
+        let mut frame =
+            frame(&self.passes, scene, settings, &self.instances, &mut self.past, surface::NEEDS, None);
+        let (image, noise) = reference::draw(&mut r, &mut frame, batches).await?;
+        self.kept = frame.kept;
+        self.hand_over(encoder, scene, image, noise)?.finish().await
+    }
+
+    /// Draws a scene `frames` times, one frame right after the other and without reading any picture, and says what each
+    /// cost; the first `warm_up` of them are left out. Empty where the adapter has no timestamps.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw`]; the device failed.
+    pub async fn measure(
+        &mut self,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        warm_up: u32,
+        frames: u32,
+    ) -> Result<Vec<FrameTimes>, RenderError> {
+        self.prepare(scene, settings)?;
+        let mut pending = VecDeque::new();
+        let mut times = Vec::new();
+        for frame in 0..warm_up + frames {
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            self.record_frame(&mut encoder, scene, settings, None)?;
+            let of_frame = self.timer.finish(&self.gpu, &mut encoder);
+            pending.push_back((frame, self.gpu.queue.submit([encoder.finish()]), of_frame));
+            if pending.len() > FRAMES_IN_FLIGHT {
+                self.collect(pending.pop_front(), warm_up, &mut times).await?;
+            }
+        }
+        while let Some(oldest) = pending.pop_front() {
+            self.collect(Some(oldest), warm_up, &mut times).await?;
+        }
+        times.retain(|t| !t.passes_ms.is_empty());
+        Ok(times)
+    }
+
+    async fn collect(
+        &self,
+        pending: Option<(u32, wgpu::SubmissionIndex, PendingTimes)>,
+        warm_up: u32,
+        times: &mut Vec<FrameTimes>,
+    ) -> Result<(), RenderError> {
+        let Some((frame, submission, of_frame)) = pending else { return Ok(()) };
+        self.gpu.wants(submission);
+        let of_frame = of_frame.read().await?;
+        if frame >= warm_up {
+            times.push(of_frame);
+        }
+        self.gpu.check()
+    }
+
+    /// A channel of the last frame, which its settings have to name in [`crate::settings::Output::channels`]; those over
+    /// points and vertices are always there. Empty where the frame has no such channel.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub async fn read(&self, channel: Channel) -> Result<ChannelData, RenderError> {
+        let buffer = match (channel, self.instances.first()) {
+            (Channel::Positions | Channel::Visibility, Some(instance)) => Some(&instance.positions),
+            (Channel::TangentFrames, Some(instance)) => Some(&instance.tangent_frames),
+            _ => None,
+        };
+        if let Some(buffer) = buffer {
+            let bytes = self.gpu.read_buffer(buffer).await?;
+            let values = of_points(channel, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
+            let count = values.len() / channel.row().components.len();
+            return Ok(ChannelData { channel, size: [count as u32, 1], values });
+        }
+        let Some(image) = self.kept.get(&channel) else {
+            return Ok(ChannelData { channel, size: [0, 0], values: Vec::new() });
+        };
+        let bytes = self.gpu.read_texture(image.texture()).await?;
+        let values = match image.texture().format() {
+            wgpu::TextureFormat::Rgba16Float => {
+                let texels: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+                let n = channel.row().components.len();
+                texels.iter().flat_map(|t| t[..n].iter().map(|v| v.to_f32())).collect()
+            }
+            _ => bytemuck::pod_collect_to_vec(&bytes),
+        };
+        Ok(ChannelData { channel, size: image.size(), values })
+    }
+
+    /// Checks a scene and makes what its frames need.
+    fn prepare(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
+        if self.checked.as_ref() != Some(settings) {
+            check_settings(&self.gpu, settings)?;
+            self.checked = Some(settings.clone());
+        }
+        check_scene(scene)?;
+        let shape = (settings.output.size, settings.frame_size(), settings.antialias());
+        if self.past_shape.as_ref() != Some(&shape) {
+            self.past_shape = Some(shape);
+            self.past.forget();
+        }
+        for (i, placed) in scene.heads.iter().enumerate() {
+            if !self.instances.get(i).is_some_and(|instance| instance.fits(placed.head)) {
+                self.instances.truncate(i);
+                self.instances.push(Instance::new(&self.gpu, placed.head));
+                self.past.forget();
+            }
+        }
+        self.diffusion.prepare(&self.gpu, settings.quality.scatter, settings.quality.profile.shared())?;
+        let needs = self.needs();
+        self.passes.prepare(&self.gpu, settings, &needs)
+    }
+
+    fn needs(&self) -> Needs {
+        self.diffusion.method.as_ref().map_or(surface::NEEDS, |m| m.needs())
+    }
+
+    fn record_frame(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        settings: &Settings,
+        into: Option<&wgpu::TextureView>,
+    ) -> Result<Option<FrameImage>, RenderError> {
+        let needs = self.needs();
+        let Some(diffusion) = &mut self.diffusion.method else {
+            return Err(RenderError::Limit {
+                what: "scattering method",
+                found: settings.quality.scatter.to_string(),
+                expected: "expected one that draws a frame in one go".into(),
+            });
+        };
+        self.images.begin_frame();
+        self.timer.restart();
+        let mut r = Recorder { gpu: &self.gpu, encoder, timer: &mut self.timer, images: &mut self.images };
+        let mut frame = frame(&self.passes, scene, settings, &self.instances, &mut self.past, needs, into);
+        let image = realtime::record(&mut r, &mut frame, diffusion.as_mut())?;
+        self.kept = frame.kept;
+        Ok(image)
+    }
+
+    /// Submits a frame together with copies of its picture and its times.
+    fn hand_over(
+        &mut self,
+        mut encoder: wgpu::CommandEncoder,
+        scene: &Scene<'_>,
+        image: Option<FrameImage>,
+        scatter_noise: Option<f64>,
+    ) -> Result<Drawn, RenderError> {
+        let Some(image) = image else { return Err(RenderError::Lost("no picture".into())) };
+        let picture = TextureReadback::new(&self.gpu, &mut encoder, image.texture());
+        let times = self.timer.finish(&self.gpu, &mut encoder);
+        let submission = self.gpu.queue.submit([encoder.finish()]);
+        let triangles = |h: &crate::scene::HeadInstance<'_>| {
+            u64::from(h.head.opaque_triangles) + u64::from(h.head.overlay_triangles)
+        };
+        let stats = FrameStats {
+            passes_ms: Vec::new(),
+            triangles: scene.heads.iter().map(triangles).sum(),
+            memory_bytes: self.memory_bytes(scene),
+            scatter_noise,
+        };
+        Ok(Drawn { gpu: self.gpu.clone(), submission, picture, times, stats })
+    }
+
+    /// Bytes of heads, buffers and images.
+    fn memory_bytes(&self, scene: &Scene<'_>) -> u64 {
+        self.images.bytes()
+            + self.instances.iter().map(Instance::bytes).sum::<u64>()
+            + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
+            + self.past.history.as_ref().map_or(0, History::memory_bytes)
+            + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()
+    }
+}
+
+fn frame<'a>(
+    passes: &'a Passes,
+    scene: &'a Scene<'a>,
+    settings: &'a Settings,
+    instances: &'a [Instance],
+    past: &'a mut Past,
+    needs: Needs,
+    into: Option<&'a wgpu::TextureView>,
+) -> Frame<'a> {
+    let transmits = passes.transmittance.is_some();
+    Frame {
+        passes,
+        scene,
+        settings,
+        heads: posed(scene, instances, past.clip_from_world.is_some()),
+        lamps: lamps(scene, transmits),
+        needs,
+        past,
+        into,
+        kept: BTreeMap::new(),
+    }
+}
+
+/// Components of a channel from rows of four (points) or eight (tangent frames) floats.
+fn of_points(channel: Channel, floats: &[f32]) -> Vec<f32> {
+    match channel {
+        Channel::Positions => floats.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect(),
+        Channel::Visibility => floats.chunks_exact(4).map(|p| p[3]).collect(),
+        _ => floats.chunks_exact(8).flat_map(|f| [f[0], f[1], f[2], f[4], f[5], f[6], f[7]]).collect(),
+    }
+}
+
+fn check_settings(gpu: &Gpu, settings: &Settings) -> Result<(), RenderError> {
+    settings.validate()?;
+    let most = gpu.device.limits().max_texture_dimension_2d;
+    let limit = |what, found: String, expected: String| Err(RenderError::Limit { what, found, expected });
+    let [w, h] = settings.output.size;
+    if w == 0 || h == 0 || w > most || h > most {
+        let expected = format!("1x1 to {most}x{most} on {}", gpu.info.name);
+        return limit("image size", format!("{w}x{h}"), expected);
+    }
+    let n = settings.samples_per_side();
+    if u64::from(w.max(h)) * u64::from(n) > u64::from(most) {
+        let expected = format!("a frame of at most {most} pixels on a side");
+        return limit("supersampling", n.to_string(), expected);
+    }
+    if settings.quality.shadow_size > most {
+        return limit("shadow map size", settings.quality.shadow_size.to_string(), format!("at most {most}"));
+    }
+    Ok(())
+}
+
+fn check_scene(scene: &Scene<'_>) -> Result<(), RenderError> {
+    let limit = |what, found: String, expected: String| Err(RenderError::Limit { what, found, expected });
+    if scene.heads.len() > MAX_HEADS {
+        return limit("number of heads", scene.heads.len().to_string(), format!("at most {MAX_HEADS}"));
+    }
+    if scene.lights.len() > MAX_LIGHTS {
+        return limit("number of lights", scene.lights.len().to_string(), format!("at most {MAX_LIGHTS}"));
+    }
+    let c = scene.camera;
+    if !(c.fov_degrees > 0.0 && c.fov_degrees < 170.0) {
+        return limit("field of view", format!("{} degrees", c.fov_degrees), "above 0 and below 170".into());
+    }
+    if !c.view_from_world().is_finite() {
+        let expected = "a finite position and a target apart from it".into();
+        return limit("camera", format!("{} looking at {}", c.position, c.target), expected);
+    }
+    if !scene.environment_rotation.is_finite() {
+        let expected = "a finite angle".into();
+        return limit("rotation of the environment", scene.environment_rotation.to_string(), expected);
+    }
+    for head in scene.heads {
+        let (found, expected) = (head.state.shapes.len(), head.head.shape_count);
+        if found != expected {
+            return limit(
+                "number of shape weights",
+                found.to_string(),
+                format!("{expected}, one for each shape"),
+            );
+        }
+        let numbers = [&head.state.shapes, &head.state.zones, &head.state.distributions];
+        if numbers.iter().any(|n| n.iter().any(|w| !w.is_finite()))
+            || !(head.state.hemoglobin_scale + head.state.pupil_mm).is_finite()
+        {
+            return limit("face state", "a weight that is not finite".into(), "finite weights".into());
+        }
+    }
+    Ok(())
+}

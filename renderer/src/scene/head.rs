@@ -1,0 +1,449 @@
+//! A head on the device: geometry for the kernels, maps as textures. Never changes after upload.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange};
+use rubor_rig::map::Map;
+use rubor_rig::mask::{Mask, resize_area};
+use wgpu::util::DeviceExt;
+
+use super::clusters::{Cluster, clusters};
+use super::footprint::mask_size;
+use super::hair_roots::roots;
+use crate::device::Gpu;
+use crate::device::texture::{self, Texel};
+use crate::error::RenderError;
+
+/// Largest melanin fraction of the skin colour table (papers/004 table 7.1).
+pub const MAX_MELANIN: f32 = 0.5;
+/// Largest hemoglobin fraction of the skin colour table (papers/004 table 7.1).
+pub const MAX_HEMOGLOBIN: f32 = 0.32;
+/// Wrinkle maps that one head can have: a weight each in the channels of four layers.
+pub const MAX_WRINKLE_MAPS: usize = 16;
+/// Blend shapes that one head can have.
+pub(crate) const MAX_SHAPES: usize = 1 << 12;
+/// Hemoglobin distributions that one head can have.
+pub const MAX_DISTRIBUTIONS: usize = 64;
+/// Wrinkle zones that one head can have.
+pub const MAX_ZONES: usize = 64;
+/// Side of the maps that are blended for each frame (256 in papers/004 section 7.6).
+pub(crate) const APPEARANCE_SIZE: u32 = 256;
+
+/// Skin colour as a function of chromophores: columns are the cube root of melanin / 0.5, rows the cube root of
+/// hemoglobin / 0.32 (papers/004 eq. 7.7); the first and last texel stand at 0 and 1.
+pub struct ColorTable<'a> {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Linear Rec. 709 albedo, row by row.
+    pub texels: &'a [[f32; 3]],
+}
+
+/// A vertex as surface.wesl reads it.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct GpuVertex {
+    pub(crate) point: u32,
+    pub(crate) u: f32,
+    pub(crate) v: f32,
+    pub(crate) padding: u32,
+}
+
+/// A head that frames can show any number of times.
+pub struct HeadOnGpu {
+    pub(crate) point_count: u32,
+    pub(crate) vertex_count: u32,
+    /// Points at the corners of the opaque triangles: an index buffer.
+    pub(crate) opaque_points: wgpu::Buffer,
+    pub(crate) opaque_triangles: u32,
+    pub(crate) overlay_triangles: u32,
+    pub(crate) shape_count: usize,
+    pub(crate) rest: wgpu::Buffer,
+    pub(crate) delta_starts: wgpu::Buffer,
+    pub(crate) deltas: wgpu::Buffer,
+    pub(crate) vertices: wgpu::Buffer,
+    pub(crate) triangles: wgpu::Buffer,
+    pub(crate) ring_starts: wgpu::Buffer,
+    pub(crate) ring: wgpu::Buffer,
+    pub(crate) hair_roots: wgpu::Buffer,
+    pub(crate) hair_root_count: u32,
+    pub(crate) maps: Option<MapsOnGpu>,
+    pub(crate) skin_color: wgpu::TextureView,
+    pub(crate) bounds: (Vec3, Vec3),
+    /// Millimetres of skin across the unit square of the texture: the median over its triangles.
+    pub(crate) mm_per_texture: f32,
+    /// Where its opaque parts can be.
+    pub(crate) clusters: Vec<Cluster>,
+    /// Bytes of buffers and textures on the device.
+    pub memory_bytes: u64,
+}
+
+pub(crate) struct MapsOnGpu {
+    pub(crate) skin: wgpu::TextureView,
+    pub(crate) gloss: wgpu::TextureView,
+    pub(crate) hair_color_linear: [f32; 3],
+    pub(crate) slopes: wgpu::TextureView,
+    pub(crate) wrinkles: wgpu::TextureView,
+    pub(crate) wrinkle_maps: u32,
+    pub(crate) distributions: wgpu::TextureView,
+    pub(crate) distribution_count: u32,
+    pub(crate) neutral_mean: wgpu::TextureView,
+    pub(crate) masks: wgpu::TextureView,
+    pub(crate) zone_maps: Vec<u32>,
+}
+
+impl HeadOnGpu {
+    /// Uploads a head.
+    ///
+    /// # Errors
+    /// The head is invalid, empty, or has more maps or triangles than a frame can address.
+    pub fn new(gpu: &Gpu, head: &Head, color: &ColorTable<'_>) -> Result<Self, RenderError> {
+        head.validate()?;
+        let limit = |what, found: usize, most: usize| {
+            if found > most {
+                let expected = format!("at most {most}");
+                return Err(RenderError::Limit { what, found: found.to_string(), expected });
+            }
+            Ok(())
+        };
+        let mesh = &head.mesh;
+        let Some(bounds) = head.bounds() else {
+            let (found, expected) = ("0".to_owned(), "at least 1".to_owned());
+            return Err(RenderError::Limit { what: "number of points", found, expected });
+        };
+        limit("number of triangles", mesh.triangles.len(), (1 << 27) - 2)?;
+        limit("number of blend shapes", head.shapes.len(), MAX_SHAPES)?;
+        limit("number of wrinkle maps", head.maps.wrinkle_slopes.len(), MAX_WRINKLE_MAPS)?;
+        limit("number of hemoglobin distributions", head.maps.distributions.len(), MAX_DISTRIBUTIONS)?;
+        limit("number of wrinkle zones", head.maps.zones.len(), MAX_ZONES)?;
+
+        let occlusion = |p: usize| mesh.occlusion.get(p).copied().unwrap_or(1.0);
+        let rest: Vec<[f32; 4]> =
+            mesh.points.iter().enumerate().map(|(i, p)| p.extend(occlusion(i)).to_array()).collect();
+        let (delta_starts, deltas) = gather_deltas(head);
+        let vertices: Vec<GpuVertex> = mesh
+            .vertices
+            .iter()
+            .map(|v| GpuVertex { point: v.point, u: v.uv.x, v: v.uv.y, padding: 0 })
+            .collect();
+        let (triangles, opaque, overlay) = ordered_triangles(head);
+        let corners = triangles[..opaque as usize].iter().flat_map(|t| &t[..3]);
+        let opaque_points: Vec<u32> = corners.map(|v| mesh.vertices[*v as usize].point).collect();
+        let (ring_starts, ring) = rings(head, &triangles);
+        let maps = upload_maps(gpu, head);
+        let hair_roots = roots(head, &triangles);
+        let texels = color.texels.iter().map(|c| [c[0], c[1], c[2], 1.0]).collect();
+        let skin_color =
+            texture::upload_half(gpu, "skin colour", [color.width, color.height], &[vec![texels]]);
+
+        let mut result = Self {
+            point_count: mesh.points.len() as u32,
+            vertex_count: mesh.vertices.len() as u32,
+            opaque_points: index_buffer(gpu, &opaque_points),
+            opaque_triangles: opaque,
+            overlay_triangles: overlay,
+            shape_count: head.shapes.len(),
+            rest: gpu.storage("rest points", &rest),
+            delta_starts: gpu.storage("delta starts", &delta_starts),
+            deltas: gpu.storage("deltas", &deltas),
+            vertices: gpu.storage("vertices", &vertices),
+            triangles: gpu.storage("triangles", &triangles),
+            ring_starts: gpu.storage("ring starts", &ring_starts),
+            ring: gpu.storage("rings", &ring),
+            hair_roots: gpu.storage("hair roots", &hair_roots),
+            hair_root_count: hair_roots.len() as u32,
+            maps,
+            skin_color,
+            bounds,
+            mm_per_texture: mm_per_texture(head),
+            clusters: clusters(head),
+            memory_bytes: 0,
+        };
+        result.memory_bytes = result.count_bytes();
+        Ok(result)
+    }
+
+    /// Triangles that go through the visibility buffer, and those that are blended over the picture.
+    pub fn triangle_counts(&self) -> (u32, u32) {
+        (self.opaque_triangles, self.overlay_triangles)
+    }
+
+    fn count_bytes(&self) -> u64 {
+        let buffers = [
+            &self.rest,
+            &self.delta_starts,
+            &self.deltas,
+            &self.vertices,
+            &self.triangles,
+            &self.ring_starts,
+            &self.ring,
+            &self.hair_roots,
+            &self.opaque_points,
+        ];
+        buffers.iter().map(|b| b.size()).sum::<u64>() + self.map_bytes()
+    }
+
+    /// Bytes of the textures of its maps.
+    pub(crate) fn map_bytes(&self) -> u64 {
+        let textures = self.maps.iter().flat_map(|m| {
+            [&m.skin, &m.gloss, &m.slopes, &m.wrinkles, &m.distributions, &m.neutral_mean, &m.masks]
+                .map(texture_bytes)
+        });
+        textures.sum()
+    }
+}
+
+/// How large the texture of skin is at rest. Faces have the densest triangles, so their scale counts most.
+fn mm_per_texture(head: &Head) -> f32 {
+    let mesh = &head.mesh;
+    let skin = mesh.parts.iter().filter(|p| p.material == Material::Skin).flat_map(|p| p.triangles.clone());
+    let mut scales: Vec<f32> = skin
+        .filter_map(|t| {
+            let corners = mesh.triangles[t as usize].map(|v| mesh.vertices[v as usize]);
+            let [a, b, c] = corners.map(|v| mesh.points[v.point as usize]);
+            let [s, t, u] = corners.map(|v| v.uv);
+            let area_mm2 = 1e6 * (b - a).cross(c - a).length();
+            let area_texture = (t - s).perp_dot(u - s).abs();
+            (area_texture > 0.0 && area_mm2 > 0.0).then(|| (area_mm2 / area_texture).sqrt())
+        })
+        .collect();
+    let middle = scales.len() / 2;
+    if scales.is_empty() { 1.0 } else { *scales.select_nth_unstable_by(middle, f32::total_cmp).1 }
+}
+
+fn texture_bytes(view: &wgpu::TextureView) -> u64 {
+    let t = view.texture();
+    let texel = u64::from(t.format().block_copy_size(None).unwrap_or(4));
+    let level = |l: u32| u64::from((t.width() >> l).max(1)) * u64::from((t.height() >> l).max(1));
+    (0..t.mip_level_count()).map(level).sum::<u64>() * texel * u64::from(t.depth_or_array_layers())
+}
+
+/// Offsets sorted by point, shapes ascending within a point: starts (one more than points) and (offset, shape).
+///
+/// A word holds the shape in its lower 12 bits and, in 10 each above, the change of ambient visibility at weights 0.5 and
+/// 1 in steps of 1/511.
+fn gather_deltas(head: &Head) -> (Vec<u32>, Vec<[u32; 4]>) {
+    let mut starts = vec![0u32; head.mesh.points.len() + 1];
+    let merged: Vec<Vec<(u32, Vec3, u32)>> = head.shapes.iter().map(merged_changes).collect();
+    for (p, ..) in merged.iter().flatten() {
+        starts[*p as usize + 1] += 1;
+    }
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    let mut next = starts.clone();
+    let mut deltas = vec![[0; 4]; starts[starts.len() - 1] as usize];
+    for (index, changes) in merged.into_iter().enumerate() {
+        for (p, offset, occlusion) in changes {
+            let slot = &mut next[p as usize];
+            let [x, y, z] = offset.to_array().map(f32::to_bits);
+            deltas[*slot as usize] = [x, y, z, index as u32 | occlusion];
+            *slot += 1;
+        }
+    }
+    (starts, deltas)
+}
+
+/// Points that a shape moves or hides: point, offset, and change of visibility in the upper bits.
+fn merged_changes(shape: &BlendShape) -> Vec<(u32, Vec3, u32)> {
+    let step = |v: f32| (v.clamp(-1.0, 1.0) * 511.0).round() as i32 as u32 & 0x3ff;
+    let packed = |c: &OcclusionChange| step(c.at_half) << 12 | step(c.at_full) << 22;
+    let mut moved = shape.points.iter().copied().zip(shape.offsets.iter().copied()).peekable();
+    let mut hidden = shape.occlusion.iter().map(|c| (c.point, packed(c))).peekable();
+    let mut merged = Vec::with_capacity(shape.points.len());
+    loop {
+        let point = match (moved.peek(), hidden.peek()) {
+            (Some((a, _)), Some((b, _))) => *a.min(b),
+            (Some((p, _)), None) | (None, Some((p, _))) => *p,
+            (None, None) => return merged,
+        };
+        let offset = moved.next_if(|m| m.0 == point).map_or(Vec3::ZERO, |m| m.1);
+        merged.push((point, offset, hidden.next_if(|h| h.0 == point).map_or(0, |h| h.1)));
+    }
+}
+
+/// Triangles with the number of their material: opaque ones first, then overlays; hidden ones are left out.
+fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, u32, u32) {
+    let of = |wanted: &dyn Fn(Material) -> bool| -> Vec<[u32; 4]> {
+        head.mesh
+            .parts
+            .iter()
+            .filter(|part| wanted(part.material))
+            .flat_map(|part| {
+                let number = part.material.number();
+                head.mesh.triangles[part.triangles.start as usize..part.triangles.end as usize]
+                    .iter()
+                    .map(move |t| [t[0], t[1], t[2], number])
+            })
+            .collect()
+    };
+    let mut triangles = of(&Material::is_opaque);
+    let opaque = triangles.len() as u32;
+    triangles.extend(of(&|m| !m.is_opaque() && m != Material::Hidden));
+    let overlay = triangles.len() as u32 - opaque;
+    (triangles, opaque, overlay)
+}
+
+fn index_buffer(gpu: &Gpu, indices: &[u32]) -> wgpu::Buffer {
+    let usage = wgpu::BufferUsages::INDEX | wgpu::BufferUsages::STORAGE;
+    // An empty buffer cannot be bound.
+    let contents: &[u32] = if indices.is_empty() { &[0] } else { indices };
+    let contents = bytemuck::cast_slice(contents);
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("opaque points"),
+        contents,
+        usage,
+    })
+}
+
+/// Triangles around each point: starts (one more than points) and indices into `triangles`.
+fn rings(head: &Head, triangles: &[[u32; 4]]) -> (Vec<u32>, Vec<u32>) {
+    let point = |v: u32| head.mesh.vertices[v as usize].point as usize;
+    let mut starts = vec![0u32; head.mesh.points.len() + 1];
+    for t in triangles {
+        for v in &t[..3] {
+            starts[point(*v) + 1] += 1;
+        }
+    }
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    let mut next = starts.clone();
+    let mut ring = vec![0; starts[starts.len() - 1] as usize];
+    for (i, t) in triangles.iter().enumerate() {
+        for v in &t[..3] {
+            let slot = &mut next[point(*v)];
+            ring[*slot as usize] = i as u32;
+            *slot += 1;
+        }
+    }
+    (starts, ring)
+}
+
+fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
+    let maps = &head.maps;
+    let (melanin, hemoglobin) = (maps.melanin.as_ref()?, maps.hemoglobin.as_ref()?);
+    let default_specular = Map::filled(1, 1, &[0.6, 0.32]);
+    let specular = maps.specular.as_ref().unwrap_or(&default_specular);
+    let flat = Map::filled(1, 1, &[0.0, 0.0]);
+    let zero = Map::filled(1, 1, &[0.0]);
+    let full = Map::filled(1, 1, &[1.0]);
+    let scattering = maps.scattering.as_ref().unwrap_or(&full);
+    let hair = maps.hair.as_ref().unwrap_or(&zero);
+    let size = largest_of([melanin, hemoglobin, scattering, hair]);
+    let skin = texels(size, |u, v| {
+        let axis = |value: f32, most: f32| (value.max(0.0) / most).cbrt();
+        [
+            axis(melanin.sample(u, v, 0), MAX_MELANIN),
+            axis(hemoglobin.sample(u, v, 0), MAX_HEMOGLOBIN),
+            scattering.sample(u, v, 0),
+            hair.sample(u, v, 0),
+        ]
+    });
+    let gloss_size = largest_of([specular]);
+    let gloss = texels(gloss_size, |u, v| [specular.sample(u, v, 0), specular.sample(u, v, 1), 0.0, 0.0]);
+    let slopes = maps.slopes.as_ref().unwrap_or(&flat);
+    let slope_size = largest_of([slopes]);
+    // Channel 2 averages the squared slope on the way down, so that each level knows the variance it lost.
+    let slope_texels = texels(slope_size, |u, v| {
+        let (x, y) = (slopes.sample(u, v, 0), slopes.sample(u, v, 1));
+        [x, y, 0.5 * (x * x + y * y), 0.0]
+    });
+    let mut slope_chain = texture::mip_chain(slope_size, slope_texels);
+    for level in &mut slope_chain {
+        for t in level {
+            t[2] = (t[2] - 0.5 * (t[0] * t[0] + t[1] * t[1])).max(0.0);
+        }
+    }
+    let wrinkle_size = largest_of(&maps.wrinkle_slopes);
+    // The relief as coarse as the wrinkles: what a difference of normals is taken from.
+    let mask = Mask::full(slopes.width, slopes.height);
+    let coarse = if maps.wrinkle_slopes.is_empty() || slopes.width <= wrinkle_size[0] {
+        slopes.clone()
+    } else {
+        resize_area(slopes, &mask, wrinkle_size[0], wrinkle_size[1]).0
+    };
+    let mut wrinkle_layers: Vec<_> = maps
+        .wrinkle_slopes
+        .iter()
+        .map(|m| {
+            let level = texels(wrinkle_size, |u, v| {
+                let (x, y) = (m.sample(u, v, 0), m.sample(u, v, 1));
+                let base = Vec2::new(coarse.sample(u, v, 0), coarse.sample(u, v, 1));
+                let normal = |slopes: Vec2| slopes.extend(1.0).normalize().truncate();
+                let difference = normal(base + Vec2::new(x, y)) - normal(base);
+                [x, y, difference.x, difference.y]
+            });
+            texture::mip_chain(wrinkle_size, level)
+        })
+        .collect();
+    if wrinkle_layers.is_empty() {
+        wrinkle_layers.push(texture::mip_chain([1, 1], vec![[0.0; 4]]));
+    }
+
+    let mean = maps.hemoglobin_mean.as_ref().unwrap_or(&zero);
+    let side = [APPEARANCE_SIZE; 2];
+    let mut distributions: Vec<_> = maps
+        .distributions
+        .iter()
+        .map(|d| {
+            let change = |u, v| {
+                [d.bias.sample(u, v, 0) - mean.sample(u, v, 0), d.scale.sample(u, v, 0) - 1.0, 0.0, 0.0]
+            };
+            vec![texels(side, change)]
+        })
+        .collect();
+    if distributions.is_empty() {
+        distributions.push(vec![vec![[0.0; 4]; (APPEARANCE_SIZE * APPEARANCE_SIZE) as usize]]);
+    }
+    let means = vec![texels(side, |u, v| [mean.sample(u, v, 0), 0.0, 0.0, 0.0])];
+    let mask_size = mask_size(maps);
+    let mut masks: Vec<_> = maps
+        .zones
+        .chunks(4)
+        .map(|zones| {
+            let weights =
+                |u, v| std::array::from_fn(|i| zones.get(i).map_or(0.0, |z| z.mask.sample(u, v, 0)));
+            vec![texels(mask_size, weights)]
+        })
+        .collect();
+    if masks.is_empty() {
+        masks.push(vec![vec![[0.0; 4]]]);
+    }
+
+    Some(MapsOnGpu {
+        skin: texture::upload_bytes::<4>(gpu, "skin", size, &[texture::mip_chain(size, skin)]),
+        gloss: texture::upload_bytes::<2>(gpu, "gloss", gloss_size, &[texture::mip_chain(gloss_size, gloss)]),
+        hair_color_linear: maps.hair_color_linear,
+        slopes: texture::upload_half(gpu, "slopes", slope_size, &[slope_chain]),
+        wrinkles: texture::array_view(&texture::upload_half(gpu, "wrinkles", wrinkle_size, &wrinkle_layers)),
+        wrinkle_maps: maps.wrinkle_slopes.len() as u32,
+        distributions: texture::array_view(&texture::upload_half_channels::<2>(
+            gpu,
+            "distributions",
+            side,
+            &distributions,
+        )),
+        distribution_count: maps.distributions.len() as u32,
+        neutral_mean: texture::upload_half_channels::<1>(gpu, "neutral mean", side, &[means]),
+        masks: texture::array_view(&texture::upload_bytes::<4>(gpu, "zone masks", mask_size, &masks)),
+        zone_maps: maps.zones.iter().map(|z| z.wrinkle_map).collect(),
+    })
+}
+
+/// The size that holds all of some maps: at least one texel.
+pub(crate) fn largest_of<'a>(maps: impl IntoIterator<Item = &'a Map>) -> [u32; 2] {
+    maps.into_iter().fold([1, 1], |s, m| [s[0].max(m.width), s[1].max(m.height)])
+}
+
+/// Texels of an image of this size from a function of texture space.
+fn texels(size: [u32; 2], f: impl Fn(f32, f32) -> Texel + Sync) -> Vec<Texel> {
+    (0..size[1])
+        .into_par_iter()
+        .flat_map_iter(|y| {
+            let f = &f;
+            (0..size[0]).map(move |x| f((x as f32 + 0.5) / size[0] as f32, (y as f32 + 0.5) / size[1] as f32))
+        })
+        .collect()
+}

@@ -1,0 +1,261 @@
+//! Lamps as shaders read them, and their views of the heads.
+
+use glam::camera::rh::{proj, view};
+use glam::{Mat4, Vec2, Vec3, Vec4};
+
+use super::clusters::Sphere;
+use super::placement::bounding_sphere;
+use super::{Environment, Light, LightKind, MAX_LIGHTS, Scene};
+use crate::device::Image;
+
+/// Cosine between the camera's view and the way to a lamp from which the lamp stands behind the heads.
+const BEHIND_COSINE: f32 = 0.4;
+
+/// A light as the shader reads it; the fields are described there.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct GpuLight {
+    pub(crate) clip_from_world: Mat4,
+    pub(crate) color: [f32; 4],
+    pub(crate) position: [f32; 4],
+    pub(crate) spot: [f32; 4],
+    pub(crate) shape: [f32; 4],
+    pub(crate) shadow: [f32; 4],
+}
+
+impl GpuLight {
+    /// A light with its shadow map, if it has one.
+    pub(crate) fn new(light: &Light, shadow: Option<(u32, LightView)>) -> Self {
+        let mut result: Self = bytemuck::Zeroable::zeroed();
+        result.color = light.color_linear.extend(light.radius).to_array();
+        result.spot[3] = -2.0;
+        match light.kind {
+            LightKind::Directional { direction } => {
+                result.position = (-direction.normalize_or(Vec3::NEG_Z)).extend(0.0).to_array();
+            }
+            LightKind::Point { position } => result.position = position.extend(1.0).to_array(),
+            LightKind::Spot { position, direction, outer_degrees, inner_degrees } => {
+                result.position = position.extend(1.0).to_array();
+                let outer = outer_degrees.to_radians().cos();
+                result.spot = direction.normalize_or(Vec3::NEG_Z).extend(outer).to_array();
+                // smoothstep needs two different edges.
+                result.shape[0] = inner_degrees.to_radians().cos().max(outer + 1e-4);
+            }
+        }
+        result.shape[1] = -1.0;
+        if let Some((layer, view)) = shadow {
+            result.clip_from_world = view.clip_from_world;
+            result.shape[1] = layer as f32;
+            result.shape[2] = view.near;
+            result.shape[3] = view.far;
+            result.shadow[0] = view.across;
+        }
+        result
+    }
+}
+
+/// The light of a frame: lamps with their shadow maps, and the environment.
+pub(crate) struct Illumination<'a> {
+    pub(crate) lights: [GpuLight; MAX_LIGHTS],
+    /// A layer for each lamp that casts shadows; at least one.
+    pub(crate) shadows: Image,
+    pub(crate) environment: Option<&'a Environment>,
+    pub(crate) environment_intensity: f32,
+    /// Radians about +Y.
+    pub(crate) environment_rotation: f32,
+}
+
+impl Illumination<'_> {
+    /// Coefficients of the environment's irradiance / pi; zeros without one.
+    pub(crate) fn harmonics(&self) -> [[f32; 4]; 9] {
+        self.environment.map_or([[0.0; 4]; 9], |e| e.harmonics_at(self.environment_rotation))
+    }
+
+    /// Levels of the filtered environment.
+    pub(crate) fn environment_levels(&self) -> f32 {
+        self.environment.map_or(1.0, |e| e.levels as f32)
+    }
+}
+
+/// A light's view of the heads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightView {
+    pub(crate) clip_from_world: Mat4,
+    /// Metres from the light (or from the plane before the sphere) to the near and far end of the depth range.
+    pub(crate) near: f32,
+    pub(crate) far: f32,
+    /// Metres across the map, at 1 m for lights with a place.
+    pub(crate) across: f32,
+}
+
+/// Room around what receives shadows, metres: half the widest search for blockers, and what light crosses in skin.
+const MARGIN_METRES: f32 = 0.012;
+/// Windows in a doubling of their size.
+const WINDOW_STEPS: f32 = 4.0;
+/// Smallest window as a share of the whole map's width.
+const LEAST_WINDOW: f32 = 1.0 / 32.0;
+/// Windows move by this share of their width: whole texels of any map of a power of two from 64.
+const WINDOW_MOVES: f32 = 1.0 / 64.0;
+
+impl LightView {
+    /// Fits a view to a sphere (metres).
+    pub(crate) fn fit(kind: &LightKind, center: Vec3, radius: f32) -> Self {
+        let (direction, distance) = match *kind {
+            LightKind::Directional { direction } => (direction.normalize_or(Vec3::NEG_Z), None),
+            LightKind::Spot { position, .. } | LightKind::Point { position } => {
+                let way = center - position;
+                (way.normalize_or(Vec3::NEG_Z), Some((position, way.length().max(1.05 * radius))))
+            }
+        };
+        let up = if direction.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
+        match distance {
+            None => {
+                let (near, far) = (0.0, 2.0 * radius);
+                let eye = center - direction * radius;
+                let projection = proj::directx::orthographic(-radius, radius, -radius, radius, near, far);
+                let view = view::look_to_mat4(eye, direction, up);
+                Self { clip_from_world: projection * view, near, far, across: 2.0 * radius }
+            }
+            Some((eye, distance)) => {
+                let (near, far) = (distance - radius, distance + radius);
+                let tangent = (radius / distance).asin().tan();
+                let projection = proj::directx::perspective(2.0 * tangent.atan(), 1.0, near, far);
+                let view = view::look_to_mat4(eye, direction, up);
+                Self { clip_from_world: projection * view, near, far, across: 2.0 * tangent }
+            }
+        }
+    }
+
+    /// The part of the view that holds spheres, as a square; all of it where that is no smaller.
+    pub(crate) fn narrowed(self, kind: &LightKind, receivers: &[Sphere]) -> Self {
+        let is_perspective = kind.position().is_some();
+        let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
+        for s in receivers {
+            let clip = self.clip_from_world * s.center.extend(1.0);
+            let radius = s.radius + MARGIN_METRES;
+            let (near, far) = match is_perspective {
+                true => ((clip.w - radius).max(self.near), clip.w + radius),
+                false => (1.0, 1.0),
+            };
+            let center = Vec2::new(clip.x, clip.y);
+            let reach = Vec2::splat(2.0 * radius / self.across);
+            // The nearer end of the sphere is farther from the middle of the picture.
+            let out = |v: Vec2, sign: f32| {
+                let at = |x: f32| x / if x * sign > 0.0 { near } else { far };
+                Vec2::new(at(v.x), at(v.y))
+            };
+            low = low.min(out(center - reach, -1.0));
+            high = high.max(out(center + reach, 1.0));
+        }
+        let (low, high) = (low.max(Vec2::NEG_ONE), high.min(Vec2::ONE));
+        let half = 0.5 * (high - low).max_element() * (1.0 + 2.0 * WINDOW_MOVES);
+        let half = ((half.max(LEAST_WINDOW).log2() * WINDOW_STEPS).ceil() / WINDOW_STEPS).exp2();
+        if !(low.cmplt(high).all() && half < 1.0) {
+            return self;
+        }
+        let step = 2.0 * half * WINDOW_MOVES;
+        let center = (0.5 * (low + high) / step).round() * step;
+        let window = Mat4::from_cols(
+            Vec4::X / half,
+            Vec4::Y / half,
+            Vec4::Z,
+            Vec4::new(-center.x / half, -center.y / half, 0.0, 1.0),
+        );
+        Self { clip_from_world: window * self.clip_from_world, across: half * self.across, ..self }
+    }
+}
+
+/// The lamps of a scene and, where the environment's light is to pass through thin parts and no lamp with shadows
+/// shines from behind the heads, a dark one there whose shadow map tells how thick they are.
+pub(crate) fn lamps(scene: &Scene<'_>, transmits: bool) -> Vec<Light> {
+    let mut lamps = scene.lights.to_vec();
+    let (center, _) = bounding_sphere(scene);
+    let view = (center - scene.camera.position).normalize_or(Vec3::NEG_Z);
+    let is_behind = |l: &Light| {
+        let direction = match l.kind {
+            LightKind::Directional { direction } => direction,
+            LightKind::Spot { position, .. } | LightKind::Point { position } => center - position,
+        };
+        l.casts_shadow && direction.normalize_or_zero().dot(view) < -BEHIND_COSINE
+    };
+    if transmits && scene.environment.is_some() && lamps.len() < MAX_LIGHTS && !lamps.iter().any(is_behind) {
+        let kind = LightKind::Directional { direction: -view };
+        lamps.push(Light { kind, color_linear: Vec3::ZERO, radius: 0.0, casts_shadow: true });
+    }
+    lamps
+}
+
+/// Lights for the shader, and the views of those that cast shadows, in the order of their layers.
+pub(crate) fn place_lights(
+    scene: &Scene<'_>,
+    lamps: &[Light],
+    receivers: &[Sphere],
+) -> ([GpuLight; MAX_LIGHTS], Vec<LightView>) {
+    let (center, radius) = bounding_sphere(scene);
+    let mut gpu_lights: [GpuLight; MAX_LIGHTS] = bytemuck::Zeroable::zeroed();
+    let mut views = Vec::new();
+    for (slot, light) in gpu_lights.iter_mut().zip(lamps) {
+        let shadow = light.casts_shadow.then(|| {
+            let view = LightView::fit(&light.kind, center, radius).narrowed(&light.kind, receivers);
+            views.push(view);
+            (views.len() as u32 - 1, view)
+        });
+        *slot = GpuLight::new(light, shadow);
+    }
+    (gpu_lights, views)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sphere_fits_the_map() {
+        let center = Vec3::new(0.1, 1.5, -0.2);
+        let kinds = [
+            LightKind::Directional { direction: Vec3::new(0.3, -1.0, -0.2) },
+            LightKind::Point { position: Vec3::new(0.5, 2.0, 1.0) },
+        ];
+        for kind in kinds {
+            let view = LightView::fit(&kind, center, 0.15);
+            for offset in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
+                let p = view.clip_from_world.project_point3(center + 0.149 * offset);
+                assert!(p.x.abs() <= 1.0 && p.y.abs() <= 1.0 && (0.0..=1.0).contains(&p.z), "{kind:?} {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_holds_what_it_is_made_for_and_little_else() {
+        let center = Vec3::new(0.1, 1.5, -0.2);
+        let kinds = [
+            LightKind::Directional { direction: Vec3::new(0.3, -1.0, -0.2) },
+            LightKind::Point { position: Vec3::new(0.5, 2.0, 1.0) },
+        ];
+        for kind in kinds {
+            let whole = LightView::fit(&kind, center, 0.15);
+            let receivers =
+                [0.0, 0.02].map(|x| Sphere { center: center + Vec3::new(x, 0.05, 0.03), radius: 0.01 });
+            let view = whole.narrowed(&kind, &receivers);
+            assert!(view.across < 0.4 * whole.across, "{} of {}", view.across, whole.across);
+            for s in receivers {
+                for offset in [Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z] {
+                    let p = view.clip_from_world.project_point3(s.center + s.radius * offset);
+                    assert!(p.x.abs() <= 1.0 && p.y.abs() <= 1.0, "{kind:?} {p}");
+                    // Depth is that of the whole map.
+                    let q = whole.clip_from_world.project_point3(s.center + s.radius * offset);
+                    assert!((p.z - q.z).abs() < 1e-5);
+                }
+            }
+            let everything = [Sphere { center, radius: 0.15 }];
+            assert_eq!(whole.narrowed(&kind, &everything).across, whole.across);
+            assert_eq!(whole.narrowed(&kind, &[]).across, whole.across);
+        }
+    }
+
+    #[test]
+    fn a_light_inside_the_head_does_not_divide_by_zero() {
+        let kind = LightKind::Point { position: Vec3::ZERO };
+        assert!(LightView::fit(&kind, Vec3::ZERO, 0.15).clip_from_world.is_finite());
+    }
+}

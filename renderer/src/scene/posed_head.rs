@@ -1,0 +1,102 @@
+//! A head of a scene with its buffers of the moment: what passes are handed.
+
+use glam::Mat4;
+use rubor_rig::face_state::FaceState;
+
+use super::head::{APPEARANCE_SIZE, HeadOnGpu};
+use super::placement::world_from_head;
+use super::{HeadInstance, Scene};
+use crate::device::{Gpu, Image, ImageSpec};
+
+/// Bytes of the tangent frame of a vertex: normal, occlusion, tangent, sign.
+const FRAME_BYTES: u64 = 32;
+
+/// A head in a state at a place, and what the passes before the view made of it.
+#[derive(Clone, Copy)]
+pub(crate) struct PosedHead<'a> {
+    /// Its number in the ids of visible triangles.
+    pub(crate) index: u32,
+    pub(crate) head: &'a HeadOnGpu,
+    pub(crate) state: &'a FaceState,
+    pub(crate) world_from_head: Mat4,
+    /// Deformed points, world space, metres; w = ambient visibility.
+    pub(crate) positions: &'a wgpu::Buffer,
+    /// Those of the previous frame; of this one where there is none.
+    pub(crate) previous_positions: &'a wgpu::Buffer,
+    /// Where the positions of this frame are kept for the next one.
+    pub(crate) kept_positions: &'a wgpu::Buffer,
+    /// Normal and tangent of each vertex, world space.
+    pub(crate) tangent_frames: &'a wgpu::Buffer,
+    /// Change of bias, change of scale and neutral mean of hemoglobin.
+    pub(crate) blood: &'a Image,
+    /// Weight of each wrinkle map, four per layer: an array, whatever its number of layers.
+    pub(crate) wrinkle_weights: &'a Image,
+}
+
+/// The buffers of one head of a scene, kept from frame to frame.
+pub(crate) struct Instance {
+    pub(crate) positions: wgpu::Buffer,
+    pub(crate) previous_positions: wgpu::Buffer,
+    pub(crate) tangent_frames: wgpu::Buffer,
+    blood: Image,
+    wrinkle_weights: Image,
+}
+
+/// Four wrinkle maps have their weights in one layer.
+pub(crate) fn wrinkle_layers(wrinkle_maps: u32) -> u32 {
+    wrinkle_maps.div_ceil(4).max(1)
+}
+
+impl Instance {
+    pub(crate) fn new(gpu: &Gpu, head: &HeadOnGpu) -> Self {
+        let points = u64::from(head.point_count) * 16;
+        let side = [APPEARANCE_SIZE; 2];
+        let spec = ImageSpec::storage(side, wgpu::TextureFormat::Rgba8Unorm).layers(layers(head));
+        let wrinkle_weights = Image::new(gpu, "wrinkle weights", spec);
+        Self {
+            positions: gpu.storage_zeroed("positions", points),
+            previous_positions: gpu.storage_zeroed("previous positions", points),
+            tangent_frames: gpu.storage_zeroed("tangent frames", u64::from(head.vertex_count) * FRAME_BYTES),
+            blood: Image::new(gpu, "blood", ImageSpec::light(side)),
+            wrinkle_weights,
+        }
+    }
+
+    /// Whether a head can use it.
+    pub(crate) fn fits(&self, head: &HeadOnGpu) -> bool {
+        self.positions.size() == (u64::from(head.point_count) * 16).max(16)
+            && self.tangent_frames.size() == (u64::from(head.vertex_count) * FRAME_BYTES).max(16)
+            && self.wrinkle_weights.texture().depth_or_array_layers() == layers(head)
+    }
+
+    /// Bytes on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        let buffers = [&self.positions, &self.previous_positions, &self.tangent_frames];
+        buffers.iter().map(|b| b.size()).sum::<u64>() + self.blood.bytes() + self.wrinkle_weights.bytes()
+    }
+}
+
+fn layers(head: &HeadOnGpu) -> u32 {
+    wrinkle_layers(head.maps.as_ref().map_or(0, |m| m.wrinkle_maps))
+}
+
+/// The heads of a scene with their buffers; `has_past` where the previous positions are known.
+pub(crate) fn posed<'a>(
+    scene: &'a Scene<'_>,
+    instances: &'a [Instance],
+    has_past: bool,
+) -> Vec<PosedHead<'a>> {
+    let posed = |(index, (placed, buffers)): (usize, (&'a HeadInstance<'_>, &'a Instance))| PosedHead {
+        index: index as u32,
+        head: placed.head,
+        state: placed.state,
+        world_from_head: world_from_head(placed),
+        positions: &buffers.positions,
+        previous_positions: if has_past { &buffers.previous_positions } else { &buffers.positions },
+        kept_positions: &buffers.previous_positions,
+        tangent_frames: &buffers.tangent_frames,
+        blood: &buffers.blood,
+        wrinkle_weights: &buffers.wrinkle_weights,
+    };
+    scene.heads.iter().zip(instances).enumerate().map(posed).collect()
+}
