@@ -1,0 +1,214 @@
+//! Every picture: its name, its scene (a sequence in `tests/scenes`) and what is special about it.
+
+/// Which head is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Model {
+    /// `assets/head.glb`.
+    Default,
+    /// The same with more melanin.
+    Dark,
+    /// The same without maps.
+    WithoutMaps,
+}
+
+/// What is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Channel {
+    /// The displayed image.
+    Image,
+    /// Linear radiance before display.
+    Hdr,
+    /// Albedo of skin, linear Rec. 709.
+    Albedo,
+    /// Diffuse light before albedo, scattered where the method scatters.
+    Diffuse,
+    /// Motion since the previous frame, pixels.
+    Velocity,
+    /// Deformed points, metres.
+    Positions,
+    /// Ambient visibility of points, 0 to 1.
+    Occlusion,
+    /// Normals of vertices.
+    Normals,
+    /// Tangents of vertices.
+    Tangents,
+}
+
+/// How a picture is drawn: methods by the names that users write.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Methods {
+    pub(crate) scatter: &'static str,
+    pub(crate) transmit: &'static str,
+    pub(crate) color: &'static str,
+    pub(crate) wrinkles: &'static str,
+    pub(crate) specular: &'static str,
+    pub(crate) antialias: &'static str,
+    pub(crate) exposure: f32,
+}
+
+/// One picture.
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    /// `group-detail`: the name of its file.
+    pub(crate) name: String,
+    /// Name of its file in `tests/scenes`.
+    pub(crate) scene: &'static str,
+    /// The heads, side by side.
+    pub(crate) models: &'static [Model],
+    /// Pixels.
+    pub(crate) size: [u32; 2],
+    /// Frames that are drawn; the last one is the picture.
+    pub(crate) frames: u32,
+    pub(crate) methods: Methods,
+    pub(crate) channel: Channel,
+}
+
+/// What a user gets who chooses nothing, without antialiasing, so that each pixel is that of one sample.
+const USUAL: Methods = Methods {
+    scatter: "separable:17",
+    transmit: "shadow-depth",
+    color: "hemoglobin",
+    wrinkles: "partial-derivative",
+    specular: "one-lobe",
+    antialias: "none",
+    exposure: 1.0,
+};
+
+fn case(name: &str, scene: &'static str, methods: Methods) -> Case {
+    Case {
+        name: name.to_owned(),
+        scene,
+        models: &[Model::Default],
+        size: [80, 80],
+        frames: 1,
+        methods,
+        channel: Channel::Image,
+    }
+}
+
+/// All pictures.
+pub(crate) fn all() -> Vec<Case> {
+    [scatter(), transmit(), appearance(), antialias(), lights(), materials(), passes(), heads()].concat()
+}
+
+fn scatter() -> Vec<Case> {
+    let methods = [
+        "none",
+        "separable:5",
+        "separable:17",
+        "separable:65",
+        "screen-gauss:4",
+        "screen-gauss:6",
+        "screen-jitter",
+        "burley-disk:16",
+        "burley-disk:64",
+        "reference-screen",
+        "reference-surface:2",
+    ];
+    let picture = |scatter: &'static str| {
+        let name = format!("scatter-{}", scatter.replace(':', "-"));
+        case(&name, "nose", Methods { scatter, transmit: "none", ..USUAL })
+    };
+    methods.into_iter().map(picture).collect()
+}
+
+fn transmit() -> Vec<Case> {
+    let picture = |transmit: &'static str| {
+        case(&format!("transmit-{transmit}"), "ear", Methods { transmit, exposure: 1.4, ..USUAL })
+    };
+    ["none", "shadow-depth"].into_iter().map(picture).collect()
+}
+
+fn appearance() -> Vec<Case> {
+    vec![
+        case("color-static", "blush", Methods { color: "static", ..USUAL }),
+        case("color-hemoglobin", "blush", USUAL),
+        case("wrinkles-none", "frown", Methods { wrinkles: "none", ..USUAL }),
+        case("wrinkles-partial-derivative", "frown", USUAL),
+        case("wrinkles-difference", "frown", Methods { wrinkles: "difference", ..USUAL }),
+        case("specular-one-lobe", "forehead", USUAL),
+        case("specular-two-lobes", "forehead", Methods { specular: "two-lobes", ..USUAL }),
+    ]
+}
+
+/// The two modes that keep a history show the fourth frame of a turning head, the others a head at rest.
+fn antialias() -> Vec<Case> {
+    let names = ["none", "mlaa", "smaa-1x", "smaa-s2x", "smaa-t2x", "smaa-4x", "ssaa:2", "ssaa:4"];
+    let picture = |antialias: &'static str| {
+        let name = format!("antialias-{}", antialias.replace(':', "-"));
+        let is_temporal = ["smaa-t2x", "smaa-4x"].contains(&antialias);
+        let (scene, frames) = if is_temporal { ("turn", 4) } else { ("head", 1) };
+        Case { frames, ..case(&name, scene, Methods { antialias, ..USUAL }) }
+    };
+    names.into_iter().map(picture).collect()
+}
+
+fn lights() -> Vec<Case> {
+    let scenes = [
+        ("light-directional", "light-directional"),
+        ("light-without-shadow", "light-without-shadow"),
+        ("light-spot", "light-spot"),
+        ("light-point", "light-point"),
+        ("light-three-point", "portrait"),
+        ("environment-studio", "environment-studio"),
+        ("environment-soft-box", "environment-soft-box"),
+        ("environment-sky", "environment-sky"),
+        ("environment-turned", "environment-turned"),
+    ];
+    scenes.into_iter().map(|(name, scene)| case(name, scene, USUAL)).collect()
+}
+
+fn materials() -> Vec<Case> {
+    let of = |name: &str, scene: &'static str, model: &'static [Model]| Case {
+        models: model,
+        ..case(name, scene, USUAL)
+    };
+    vec![
+        of("material-skin", "skin", &[Model::Default]),
+        of("material-dark-skin", "portrait", &[Model::Dark]),
+        of("material-without-maps", "portrait", &[Model::WithoutMaps]),
+        of("material-eye", "eye", &[Model::Default]),
+        of("material-wide-pupil", "dark-room-eye", &[Model::Default]),
+        of("material-mouth", "mouth", &[Model::Default]),
+        of("material-cropped-hair", "scalp", &[Model::Default]),
+        of("material-brow-and-lashes", "brow", &[Model::Default]),
+    ]
+}
+
+fn passes() -> Vec<Case> {
+    let read = |name: &str, scene: &'static str, channel| Case { channel, ..case(name, scene, USUAL) };
+    let light = |name: &str, scatter| Case {
+        channel: Channel::Diffuse,
+        ..case(name, "nose", Methods { scatter, transmit: "none", ..USUAL })
+    };
+    let moving = |name: &str, antialias| Case {
+        channel: Channel::Velocity,
+        frames: 3,
+        ..case(name, "turn", Methods { antialias, ..USUAL })
+    };
+    vec![
+        read("pass-morph", "surprise", Channel::Positions),
+        read("pass-morph-occlusion", "mouth", Channel::Occlusion),
+        read("pass-surface-frames-normals", "surprise", Channel::Normals),
+        read("pass-surface-frames-tangents", "surprise", Channel::Tangents),
+        read("pass-shade-albedo", "blush", Channel::Albedo),
+        light("pass-shade-irradiance", "none"),
+        light("pass-scatter-diffuse", "separable:17"),
+        read("pass-compose-hdr", "portrait", Channel::Hdr),
+        moving("pass-velocity", "smaa-t2x"),
+        case("pass-display-dark", "portrait", Methods { exposure: 0.25, ..USUAL }),
+        case("pass-display-bright", "portrait", Methods { exposure: 4.0, ..USUAL }),
+    ]
+}
+
+fn heads() -> Vec<Case> {
+    let row = &[Model::Default, Model::Dark, Model::WithoutMaps];
+    vec![
+        case("head-surprise", "surprise", Methods { antialias: "smaa-1x", ..USUAL }),
+        Case {
+            models: row,
+            size: [144, 80],
+            ..case("head-three-in-a-row", "crowd", Methods { antialias: "smaa-1x", ..USUAL })
+        },
+    ]
+}

@@ -1,0 +1,205 @@
+//! The only place of the goldens that calls the renderer: a scene goes in, pixels or values come out.
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::sync::Arc;
+
+use glam::{Mat4, Vec3};
+use rubor_assets::import;
+use rubor_renderer::{
+    AppearanceMethods, Camera, ColorTable, Environment, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Light,
+    LightKind, Renderer, Scene, Settings, antialias, list_adapters,
+};
+use rubor_rig::evaluate::{EnvironmentState, LightState, Shot};
+use rubor_rig::head::{Head, SkinMaps};
+use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
+use rubor_rig::skin::profile::Profile;
+use rubor_rig::timeline;
+use rubor_tests::tolerance::Adapter;
+
+use crate::cases::{Channel, Methods, Model};
+
+/// Radiance behind the heads: a dark grey that shows outlines.
+const BACKDROP_LINEAR: Vec3 = Vec3::new(0.016, 0.018, 0.021);
+/// Distance of heads that stand side by side, metres.
+const SPACING: f32 = 0.26;
+/// Radius of a lamp with a place, metres, and tangent of the angular radius of a directional one.
+const LAMP_RADIUS: [f32; 2] = [0.12, 0.05];
+/// Side of the skin colour table, texels.
+const COLOR_TABLE_SIDE: u32 = 64;
+/// Texels on a side of a shadow map: 0.3 mm in a picture of a face.
+const SHADOW_SIZE: u32 = 512;
+/// Melanin of the dark skin in units of the default one.
+const DARK_MELANIN: f32 = 6.0;
+
+pub(crate) type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// What a frame left on the device.
+pub(crate) enum Drawn {
+    /// The displayed image, RGBA.
+    Image(Vec<u8>),
+    /// An image of numbers, rows from the top.
+    Values(Vec<[f32; 4]>),
+    /// Points of the head with a vector each, metres.
+    Points(Vec<(Vec3, [f32; 4])>),
+}
+
+/// A renderer with every head that cases draw.
+pub(crate) struct Stage {
+    renderer: Renderer,
+    heads: BTreeMap<Model, (Head, HeadOnGpu)>,
+    environments: BTreeMap<String, Environment>,
+}
+
+/// The default head and its variants.
+fn models() -> Outcome<[(Model, Head); 3]> {
+    let file = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/head.glb"));
+    let default = import::gltf::from_bytes(&std::fs::read(file)?, file)?.head;
+    let mut dark = default.clone();
+    for value in dark.maps.melanin.iter_mut().flat_map(|map| &mut map.values) {
+        *value = (*value * DARK_MELANIN).min(0.5);
+    }
+    let bare = Head { maps: SkinMaps::default(), ..default.clone() };
+    Ok([(Model::Default, default), (Model::Dark, dark), (Model::WithoutMaps, bare)])
+}
+
+impl Stage {
+    /// Opens the adapter that `RUBOR_ADAPTER` names, else the software rasteriser, else the best one.
+    pub(crate) fn open() -> Outcome<Self> {
+        let software = list_adapters().into_iter().find(|a| a.name.starts_with("llvmpipe")).map(|a| a.name);
+        let wanted = std::env::var("RUBOR_ADAPTER").ok().or(software);
+        let renderer = Renderer::new(Gpu::new(wanted.as_deref())?)?;
+        let lookup = SkinModel::new(&ChromophoreModel::default()).bake(COLOR_TABLE_SIDE, COLOR_TABLE_SIDE);
+        let color = ColorTable { width: lookup.width, height: lookup.height, texels: &lookup.texels };
+        let mut heads = BTreeMap::new();
+        for (model, head) in models()? {
+            let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &color)?;
+            heads.insert(model, (head, on_gpu));
+        }
+        Ok(Self { renderer, heads, environments: BTreeMap::new() })
+    }
+
+    /// The adapter.
+    pub(crate) fn adapter(&self) -> Adapter {
+        let info = &self.renderer.gpu().info;
+        Adapter {
+            name: info.name.clone(),
+            driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+        }
+    }
+
+    /// A head on the CPU.
+    pub(crate) fn head(&self, model: Model) -> &Head {
+        &self.heads[&model].0
+    }
+
+    /// Draws the frames of a scene, one after the other from a cut, and reads a channel of the last one.
+    pub(crate) fn draw(
+        &mut self,
+        models: &[Model],
+        frames: &[Shot],
+        size: [u32; 2],
+        methods: &Methods,
+        channel: Channel,
+    ) -> Outcome<Drawn> {
+        let mode = antialias::Mode::ALL.into_iter().find(|mode| mode.name() == methods.antialias);
+        let supersampling = methods.antialias.strip_prefix("ssaa:").map(str::parse).transpose()?;
+        let mode = mode.or(supersampling.and(Some(antialias::Mode::None))).ok_or(methods.antialias)?;
+        let settings = Settings {
+            size,
+            scatter: methods.scatter.parse()?,
+            transmit: methods.transmit.parse()?,
+            appearance: AppearanceMethods {
+                color: methods.color.parse()?,
+                wrinkles: methods.wrinkles.parse()?,
+                specular: methods.specular.parse()?,
+            },
+            profile: Arc::new(Profile::deon_six()),
+            antialias: antialias::Settings::new(mode, antialias::Preset::High),
+            supersampling: supersampling.unwrap_or(1),
+            shadow_size: SHADOW_SIZE,
+            exposure: methods.exposure,
+        };
+        let mut image = Vec::new();
+        self.renderer.cut(0);
+        for shot in frames {
+            if let Some(state) = &shot.environment {
+                let map = EnvironmentMap::named(&state.name).ok_or("no such environment")?;
+                let upload = || map.rotated(state.rotation_y.to_degrees()).upload(self.renderer.gpu());
+                self.environments.entry(environment_key(state)).or_insert_with(upload);
+            }
+            let middle = (models.len() as f32 - 1.0) / 2.0;
+            let place = |i: usize| Mat4::from_translation(Vec3::X * ((i as f32 - middle) * SPACING));
+            let instances: Vec<_> = models
+                .iter()
+                .enumerate()
+                .map(|(i, model)| HeadInstance {
+                    head: &self.heads[model].1,
+                    state: &shot.face,
+                    world_from_head: place(i),
+                })
+                .collect();
+            let scene = Scene {
+                heads: &instances,
+                camera: Camera {
+                    position: shot.camera.position,
+                    target: shot.camera.target,
+                    up: shot.camera.up,
+                    fov_degrees: shot.camera.fov_y.to_degrees(),
+                },
+                lights: &shot.lights.iter().map(light).collect::<Vec<_>>(),
+                environment: shot.environment.as_ref().map(|e| &self.environments[&environment_key(e)]),
+                environment_intensity: shot.environment.as_ref().map_or(0.0, |e| e.intensity),
+                background_linear: BACKDROP_LINEAR,
+            };
+            image = self.renderer.render(&scene, &settings)?.0.rgba;
+        }
+        let renderer = &self.renderer;
+        let mesh = &self.head(models[0]).mesh;
+        Ok(match channel {
+            Channel::Image => Drawn::Image(image),
+            Channel::Hdr => Drawn::Values(renderer.read_hdr()?),
+            Channel::Albedo => Drawn::Values(renderer.read_albedo()?),
+            Channel::Diffuse => Drawn::Values(renderer.read_diffuse()?),
+            Channel::Velocity => {
+                Drawn::Values(renderer.read_velocity()?.into_iter().map(|[x, y]| [x, y, 0.0, 0.0]).collect())
+            }
+            Channel::Positions => {
+                let points = renderer.read_positions()?.into_iter();
+                Drawn::Points(points.map(|p| (p, [p.x, p.y, p.z, 0.0])).collect())
+            }
+            Channel::Occlusion => {
+                let points = renderer.read_positions()?.into_iter();
+                Drawn::Points(points.zip(renderer.read_occlusion()?).map(|(p, v)| (p, [v; 4])).collect())
+            }
+            Channel::Normals | Channel::Tangents => {
+                let points = renderer.read_positions()?;
+                let frames = mesh.vertices.iter().zip(renderer.read_surface_frames()?);
+                let vector = |(normal, tangent): (Vec3, glam::Vec4)| match channel {
+                    Channel::Normals => normal.extend(0.0).to_array(),
+                    _ => tangent.to_array(),
+                };
+                Drawn::Points(frames.map(|(v, frame)| (points[v.point as usize], vector(frame))).collect())
+            }
+        })
+    }
+}
+
+fn environment_key(state: &EnvironmentState) -> String {
+    format!("{} turned by {} degrees", state.name, state.rotation_y.to_degrees())
+}
+
+fn light(state: &LightState) -> Light {
+    let (kind, radius) = match state.kind {
+        timeline::LightKind::Directional => {
+            (LightKind::Directional { direction: state.direction }, LAMP_RADIUS[1])
+        }
+        timeline::LightKind::Spot => {
+            let [inner_degrees, outer_degrees] = state.cone_half_angles.map(f32::to_degrees);
+            let (position, direction) = (state.position, state.direction);
+            (LightKind::Spot { position, direction, inner_degrees, outer_degrees }, LAMP_RADIUS[0])
+        }
+        timeline::LightKind::Point => (LightKind::Point { position: state.position }, LAMP_RADIUS[0]),
+    };
+    Light { kind, color_linear: state.power_linear, radius, casts_shadow: state.shadow }
+}
