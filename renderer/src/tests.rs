@@ -1,6 +1,6 @@
 //! Shaders against Rust, kernels against the CPU, and what every frame keeps to.
 
-use glam::{Mat4, Quat, Vec2, Vec3};
+use glam::{DVec3, Mat4, Quat, Vec2, Vec3};
 use rubor_rig::deform;
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{
@@ -491,4 +491,99 @@ fn several_heads_of_one_frame_keep_apart() {
     let lit = |x: usize, y: usize| image.rgba[4 * (y * 64 + x) + 1] > 40;
     assert!(lit(23, 16) && lit(41, 16), "both are there");
     assert!(!lit(32, 2), "the sky between them is empty");
+}
+
+/// Where the ray through a pixel meets the triangle that it sees, in f64.
+pub(crate) struct Hit {
+    pub(crate) vertices: [u32; 3],
+    pub(crate) barycentric: [f64; 3],
+    pub(crate) position: DVec3,
+}
+
+/// What pixel `i` of a square image sees of a head, `offset_px` right and down of its middle; nothing for the background. All of a test's
+/// triangles are opaque, so their order is that of the mesh.
+pub(crate) fn seen_surface(
+    head: &Head,
+    points: &[Vec3],
+    id: u32,
+    camera: &Camera,
+    size: u32,
+    i: u32,
+    offset_px: [f32; 2],
+) -> Option<Hit> {
+    let vertices = head.mesh.triangles[(id & 0x07ff_ffff).checked_sub(1)? as usize];
+    let corners = vertices.map(|v| points[head.mesh.vertices[v as usize].point as usize].as_dvec3());
+    let at =
+        |n: u32, axis: usize| (f64::from(n) + 0.5 + f64::from(offset_px[axis])) / f64::from(size) * 2.0 - 1.0;
+    let tangent = (0.5 * f64::from(camera.fov_degrees).to_radians()).tan();
+    let world_from_view = camera.view_from_world().as_dmat4().inverse();
+    let ray = world_from_view.transform_vector3(DVec3::new(
+        at(i % size, 0) * tangent,
+        -at(i / size, 1) * tangent,
+        -1.0,
+    ));
+    let origin = camera.position.as_dvec3();
+    let [a, b, c] = corners.map(|p| p - origin);
+    let volumes = [ray.dot(b.cross(c)), ray.dot(c.cross(a)), ray.dot(a.cross(b))];
+    let sum: f64 = volumes.iter().sum();
+    let barycentric = volumes.map(|v| v / sum);
+    let position = (0..3).map(|k| barycentric[k] * corners[k]).sum();
+    Some(Hit { vertices, barycentric, position })
+}
+
+#[test]
+fn velocity_is_the_motion_of_the_point_that_a_pixel_sees() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let size = 40;
+    let mut settings = settings([size; 2]);
+    settings.quality.antialias = AntialiasMethod::SmaaT2x;
+    let cameras = [CAMERA, Camera { position: Vec3::new(0.02, 0.01, 0.49), ..CAMERA }];
+    let mut states = [FaceState::neutral(&head), FaceState::neutral(&head)];
+    states[1].shapes = vec![0.6, 0.2];
+    states[1].head_rotation = Quat::from_rotation_y(0.05);
+    let mut points = Vec::new();
+    for (camera, state) in cameras.into_iter().zip(&states) {
+        let scene = Scene {
+            heads: &[HeadInstance { head: &on_gpu, state, world_from_head: Mat4::IDENTITY }],
+            camera,
+            lights: &[],
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+        };
+        render(&mut renderer, &scene, &settings).expect("it draws");
+        points.push(read_vectors(&renderer, Channel::Positions));
+    }
+    let ids: Vec<[f32; 1]> = read(&renderer, Channel::Ids).texels().collect();
+    let velocity: Vec<[f32; 2]> = read(&renderer, Channel::Velocity).texels().collect();
+    let place = |camera: &Camera, p: DVec3| {
+        let clip_from_world = (camera.clip_from_view(1.0) * camera.view_from_world()).as_dmat4();
+        let clip = clip_from_world * p.extend(1.0);
+        glam::DVec2::new(clip.x / clip.w * 0.5 + 0.5, 0.5 - clip.y / clip.w * 0.5) * f64::from(size)
+    };
+    // Where in the pixel the second frame looks.
+    let offset_px = settings.antialias().mode.subsamples(1)[0].position_px;
+    let (mut compared, mut fastest) = (0, 0.0f64);
+    for (i, found) in velocity.iter().enumerate() {
+        let id = ids[i][0].to_bits();
+        let Some(hit) = seen_surface(&head, &points[1], id, &cameras[1], size, i as u32, offset_px) else {
+            assert_eq!(*found, [0.0, 0.0], "the background does not move");
+            continue;
+        };
+        let before: DVec3 = (0..3)
+            .map(|k| {
+                let point = head.mesh.vertices[hit.vertices[k] as usize].point as usize;
+                hit.barycentric[k] * points[0][point].as_dvec3()
+            })
+            .sum();
+        let expected = place(&cameras[1], hit.position) - place(&cameras[0], before);
+        let error = glam::DVec2::new(f64::from(found[0]), f64::from(found[1])).distance(expected);
+        assert!(error < 4e-3, "pixel {i}: {found:?}, expected {expected}");
+        compared += 1;
+        fastest = fastest.max(expected.length());
+    }
+    assert!(compared > 300 && fastest > 1.0, "{compared} pixels, up to {fastest} pixels fast");
 }

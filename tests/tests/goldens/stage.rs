@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
-use std::sync::Arc;
 
 use glam::{Mat4, Vec3};
 use rubor_assets::import;
+use rubor_renderer::channels;
+use rubor_renderer::settings::{Look, Output, Quality, Settings};
 use rubor_renderer::{
-    AppearanceMethods, Camera, ColorTable, Environment, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Light,
-    LightKind, Renderer, Scene, Settings, antialias, list_adapters,
+    Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind, Renderer,
+    Scene, native,
 };
-use rubor_rig::evaluate::{EnvironmentState, LightState, Shot};
+use rubor_rig::evaluate::{LightState, Shot};
 use rubor_rig::head::{Head, SkinMaps};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
-use rubor_rig::skin::profile::Profile;
 use rubor_rig::timeline;
 use rubor_tests::tolerance::Adapter;
 
@@ -66,9 +66,10 @@ fn models() -> Outcome<[(Model, Head); 3]> {
 impl Stage {
     /// Opens the adapter that `RUBOR_ADAPTER` names, else the software rasteriser, else the best one.
     pub(crate) fn open() -> Outcome<Self> {
-        let software = list_adapters().into_iter().find(|a| a.name.starts_with("llvmpipe")).map(|a| a.name);
+        let software =
+            native::adapters().into_iter().find(|a| a.name.starts_with("llvmpipe")).map(|a| a.name);
         let wanted = std::env::var("RUBOR_ADAPTER").ok().or(software);
-        let renderer = Renderer::new(Gpu::new(wanted.as_deref())?)?;
+        let renderer = Renderer::new(native::open(wanted.as_deref())?)?;
         let lookup = SkinModel::new(&ChromophoreModel::default()).bake(COLOR_TABLE_SIDE, COLOR_TABLE_SIDE);
         let color = ColorTable { width: lookup.width, height: lookup.height, texels: &lookup.texels };
         let mut heads = BTreeMap::new();
@@ -102,31 +103,31 @@ impl Stage {
         methods: &Methods,
         channel: Channel,
     ) -> Outcome<Drawn> {
-        let mode = antialias::Mode::ALL.into_iter().find(|mode| mode.name() == methods.antialias);
-        let supersampling = methods.antialias.strip_prefix("ssaa:").map(str::parse).transpose()?;
-        let mode = mode.or(supersampling.and(Some(antialias::Mode::None))).ok_or(methods.antialias)?;
         let settings = Settings {
-            size,
-            scatter: methods.scatter.parse()?,
-            transmit: methods.transmit.parse()?,
-            appearance: AppearanceMethods {
+            output: Output {
+                size,
+                channels: channels::CHANNELS.iter().map(|row| row.channel).collect(),
+                ..Output::default()
+            },
+            quality: Quality {
+                scatter: methods.scatter.parse()?,
+                transmit: methods.transmit.parse()?,
                 color: methods.color.parse()?,
                 wrinkles: methods.wrinkles.parse()?,
                 specular: methods.specular.parse()?,
+                antialias: methods.antialias.parse()?,
+                shadow_size: SHADOW_SIZE,
+                ..Quality::default()
             },
-            profile: Arc::new(Profile::deon_six()),
-            antialias: antialias::Settings::new(mode, antialias::Preset::High),
-            supersampling: supersampling.unwrap_or(1),
-            shadow_size: SHADOW_SIZE,
-            exposure: methods.exposure,
+            look: Look { exposure: methods.exposure, ..Look::default() },
         };
         let mut image = Vec::new();
         self.renderer.cut(0);
         for shot in frames {
             if let Some(state) = &shot.environment {
                 let map = EnvironmentMap::named(&state.name).ok_or("no such environment")?;
-                let upload = || map.rotated(state.rotation_y.to_degrees()).upload(self.renderer.gpu());
-                self.environments.entry(environment_key(state)).or_insert_with(upload);
+                let upload = || map.upload(self.renderer.gpu());
+                self.environments.entry(state.name.clone()).or_insert_with(upload);
             }
             let middle = (models.len() as f32 - 1.0) / 2.0;
             let place = |i: usize| Mat4::from_translation(Vec3::X * ((i as f32 - middle) * SPACING));
@@ -148,45 +149,51 @@ impl Stage {
                     fov_degrees: shot.camera.fov_y.to_degrees(),
                 },
                 lights: &shot.lights.iter().map(light).collect::<Vec<_>>(),
-                environment: shot.environment.as_ref().map(|e| &self.environments[&environment_key(e)]),
+                environment: shot.environment.as_ref().map(|e| &self.environments[&e.name]),
+                environment_rotation: shot.environment.as_ref().map_or(0.0, |e| e.rotation_y),
                 environment_intensity: shot.environment.as_ref().map_or(0.0, |e| e.intensity),
                 background_linear: BACKDROP_LINEAR,
             };
-            image = self.renderer.render(&scene, &settings)?.0.rgba;
+            let gpu = self.renderer.gpu().clone();
+            image = native::wait(&gpu, self.renderer.render(&scene, &settings))?.0.rgba;
         }
-        let renderer = &self.renderer;
+        let read = |channel| native::wait(self.renderer.gpu(), self.renderer.read(channel));
+        let points = read(channels::Channel::Positions)?;
+        let points: Vec<Vec3> = points.texels::<3>().map(Vec3::from_array).collect();
+        let values = |channel| -> Outcome<Vec<[f32; 4]>> { Ok(read(channel)?.texels().collect()) };
         let mesh = &self.head(models[0]).mesh;
         Ok(match channel {
             Channel::Image => Drawn::Image(image),
-            Channel::Hdr => Drawn::Values(renderer.read_hdr()?),
-            Channel::Albedo => Drawn::Values(renderer.read_albedo()?),
-            Channel::Diffuse => Drawn::Values(renderer.read_diffuse()?),
+            Channel::Hdr => Drawn::Values(values(channels::Channel::Radiance)?),
+            Channel::Albedo => Drawn::Values(values(channels::Channel::Albedo)?),
+            Channel::Diffuse => {
+                let light = values(channels::Channel::Diffuse)?;
+                let strength = values(channels::Channel::Albedo)?;
+                let pixel = |([r, g, b, _], [.., a]): ([f32; 4], [f32; 4])| [r, g, b, a];
+                Drawn::Values(light.into_iter().zip(strength).map(pixel).collect())
+            }
             Channel::Velocity => {
-                Drawn::Values(renderer.read_velocity()?.into_iter().map(|[x, y]| [x, y, 0.0, 0.0]).collect())
+                let velocity = read(channels::Channel::Velocity)?;
+                Drawn::Values(velocity.texels::<2>().map(|[x, y]| [x, y, 0.0, 0.0]).collect())
             }
             Channel::Positions => {
-                let points = renderer.read_positions()?.into_iter();
-                Drawn::Points(points.map(|p| (p, [p.x, p.y, p.z, 0.0])).collect())
+                Drawn::Points(points.into_iter().map(|p| (p, [p.x, p.y, p.z, 0.0])).collect())
             }
             Channel::Occlusion => {
-                let points = renderer.read_positions()?.into_iter();
-                Drawn::Points(points.zip(renderer.read_occlusion()?).map(|(p, v)| (p, [v; 4])).collect())
+                let visibility = read(channels::Channel::Visibility)?.values;
+                Drawn::Points(points.into_iter().zip(visibility).map(|(p, v)| (p, [v; 4])).collect())
             }
             Channel::Normals | Channel::Tangents => {
-                let points = renderer.read_positions()?;
-                let frames = mesh.vertices.iter().zip(renderer.read_surface_frames()?);
-                let vector = |(normal, tangent): (Vec3, glam::Vec4)| match channel {
-                    Channel::Normals => normal.extend(0.0).to_array(),
-                    _ => tangent.to_array(),
+                let frames = read(channels::Channel::TangentFrames)?;
+                let vector = |[nx, ny, nz, tx, ty, tz, sign]: [f32; 7]| match channel {
+                    Channel::Normals => [nx, ny, nz, 0.0],
+                    _ => [tx, ty, tz, sign],
                 };
-                Drawn::Points(frames.map(|(v, frame)| (points[v.point as usize], vector(frame))).collect())
+                let placed = mesh.vertices.iter().zip(frames.texels::<7>());
+                Drawn::Points(placed.map(|(v, frame)| (points[v.point as usize], vector(frame))).collect())
             }
         })
     }
-}
-
-fn environment_key(state: &EnvironmentState) -> String {
-    format!("{} turned by {} degrees", state.name, state.rotation_y.to_degrees())
 }
 
 fn light(state: &LightState) -> Light {

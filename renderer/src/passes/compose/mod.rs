@@ -7,6 +7,9 @@
 //! Theory: post-scatter texturing (d'Eon and Luebke 2007; papers/004 section 7.6): measured albedo already holds the
 //! blur of scattering, so it multiplies after the blur.
 
+#[cfg(test)]
+mod tests;
+
 use glam::Vec3;
 
 use crate::device::wgsl::{Module, Program, module};

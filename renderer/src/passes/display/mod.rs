@@ -7,6 +7,9 @@
 //! Theory: exposure, the filmic curve of Hable 2010 (papers/004 section 8.3 and ch. 11: "really crisp blacks") or none,
 //! IEC 61966-2-1 transfer.
 
+#[cfg(test)]
+mod tests;
+
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
 use crate::passes::block_groups;

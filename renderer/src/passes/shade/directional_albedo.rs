@@ -16,8 +16,8 @@ pub(crate) const COSINES: u32 = SIDE;
 pub(crate) const SIZE: [u32; 2] = [SIDE + 1, SIDE];
 /// Samples along and around the lobe.
 const SAMPLES: [u32; 2] = [24, 24];
-/// Least square of |L + V|, as in shade.wesl: where both graze, the lobe would leave any bound.
-const LEAST_SQUARE: f32 = 0.3;
+/// Least square of |L + V|: where both graze, the lobe would leave any bound.
+pub(crate) const LEAST_SQUARE: f32 = 0.3;
 
 /// Factor of f0 and what is added to it.
 pub(crate) fn scale_and_bias(roughness: f32, cosine: f32) -> [f32; 2] {

@@ -53,6 +53,8 @@
 
 pub(crate) mod directional_albedo;
 #[cfg(test)]
+pub(crate) mod reference;
+#[cfg(test)]
 mod tests;
 
 use glam::{Vec3, Vec4};
@@ -100,12 +102,17 @@ fn with_constants(program: Program) -> Program {
         .constant("MAX_HEMOGLOBIN", MAX_HEMOGLOBIN)
         .constant("TRANSMIT_RINGS", RINGS as u32)
         .constant("TABLE_COSINES", directional_albedo::COSINES)
+        .constant("LEAST_HALF_SQUARE", directional_albedo::LEAST_SQUARE)
+        .constant("SKIN_F0", SKIN_F0)
         .constant("SKIN", Material::Skin.number())
         .constant("MUCOSA", Material::Mucosa.number())
         .constant("EYE", Material::Eye.number())
         .constant("TEETH", Material::Teeth.number())
         .constant("GUMS", Material::Gums.number())
 }
+
+/// Reflectance of skin seen head on, of the index 1.4.
+pub(crate) const SKIN_F0: f32 = 0.028;
 
 /// Entries of T(s): a step of 0.03 mm for skin.
 const TRANSMITTANCE_ENTRIES: usize = 256;

@@ -1,11 +1,16 @@
 //! Light that spreads within what `scatter` leaves alone.
 
-use glam::{Mat4, Vec2, Vec3};
+use glam::{DVec3, Mat4, Vec2, Vec3};
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Head, Material, Mesh, Part, Vertex};
+use rubor_rig::map::Map;
 
+use super::reference;
 use crate::channels::Channel;
-use crate::tests::{WHITE_TABLE, read_texels, render, renderer, settings};
+use crate::settings::{ScatterMethod, TransmitMethod};
+use crate::tests::{
+    WHITE_TABLE, dome, read, read_texels, read_vectors, render, renderer, seen_surface, settings,
+};
 use crate::{Camera, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
 const SIZE: u32 = 128;
@@ -98,5 +103,71 @@ fn lobes_keep_the_mean_square_slope() {
         let [first, second, share] = method.lobes();
         let square = (1.0 - share) * first * first + share * second * second;
         assert!((square - 1.0).abs() < 2e-3, "{method} keeps the mean square slope: {square}");
+    }
+}
+
+#[test]
+fn a_lamp_on_bare_skin_is_the_equation() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    let (specular, roughness) = (0.7f32, 0.34f32);
+    head.maps.slopes = None;
+    head.maps.hair = None;
+    head.maps.specular = Some(Map::filled(1, 1, &[specular, roughness]));
+    head.mesh.occlusion.clear();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("it uploads");
+    let skin =
+        reference::Skin { albedo: 0.8, specular: f64::from(specular), roughness: f64::from(roughness) };
+    let state = FaceState::neutral(&head);
+    let size = 45;
+    let mut settings = settings([size; 2]);
+    settings.quality.scatter = ScatterMethod::None;
+    settings.quality.transmit = TransmitMethod::None;
+    let camera = Camera { position: 0.5 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 };
+    for direction in [Vec3::new(0.1, -0.2, -1.0), Vec3::new(-0.8, -0.5, -0.6), Vec3::new(0.9, 0.3, -0.25)] {
+        let kind = LightKind::Directional { direction };
+        let lamp = Light { kind, color_linear: Vec3::new(2.0, 1.0, 0.5), radius: 0.0, casts_shadow: false };
+        let scene = Scene {
+            heads: &[HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }],
+            camera,
+            lights: &[lamp],
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+        };
+        render(&mut renderer, &scene, &settings).expect("it draws");
+        let points = read_vectors(&renderer, Channel::Positions);
+        let frames: Vec<[f32; 7]> = read(&renderer, Channel::TangentFrames).texels().collect();
+        let ids: Vec<[f32; 1]> = read(&renderer, Channel::Ids).texels().collect();
+        let hdr = read_texels(&renderer, Channel::Radiance);
+        let to_light = -direction.as_dvec3().normalize();
+        let (mut compared, mut largest) = (0, 0.0f64);
+        for (i, found) in hdr.iter().enumerate() {
+            let Some(hit) =
+                seen_surface(&head, &points, ids[i][0].to_bits(), &camera, size, i as u32, [0.0; 2])
+            else {
+                continue;
+            };
+            let normal_of = |k: usize| {
+                let f = frames[hit.vertices[k] as usize];
+                DVec3::new(f64::from(f[0]), f64::from(f[1]), f64::from(f[2]))
+            };
+            let normal = (0..3).map(|k| hit.barycentric[k] * normal_of(k)).sum::<DVec3>().normalize();
+            let to_viewer = (camera.position.as_dvec3() - hit.position).normalize();
+            // Past the horizon the shader fades; there the equation has nothing to say.
+            if normal.dot(to_light) < 0.15 || normal.dot(to_viewer) < 0.15 {
+                continue;
+            }
+            compared += 1;
+            let expected = skin.radiance(normal, to_light, to_viewer);
+            for c in 0..3 {
+                let irradiance = f64::from(lamp.color_linear[c]);
+                let error = (f64::from(found[c]) / irradiance - expected).abs() / expected;
+                largest = largest.max(error);
+            }
+        }
+        // The table of reflected shares is linear between 32 cosines and 32 roughnesses; halves keep 11 bits.
+        assert!(compared > 200 && largest < 0.01, "{direction}: {compared} pixels, error up to {largest}");
     }
 }

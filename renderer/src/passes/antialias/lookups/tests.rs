@@ -4,7 +4,7 @@ use std::path::PathBuf;
 /// The published table in `file`, or nothing where the shared data is not at hand.
 fn published(file: &str) -> Option<Vec<u8>> {
     let Some(folder) = std::env::var_os("RUBOR_SHARED") else {
-        eprintln!("SKIPPED: RUBOR_SHARED is not set, {file} is not compared");
+        crate::testing::skipped(&format!("RUBOR_SHARED is not set, {file} is not compared"));
         return None;
     };
     let path = PathBuf::from(folder).join("smaa").join(file);

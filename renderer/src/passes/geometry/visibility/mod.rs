@@ -109,7 +109,7 @@ mod tests {
     fn triangles_are_the_same_whoever_numbers_them() {
         let Some(gpu) = gpu() else { return };
         if !gpu.device.features().contains(wgpu::Features::PRIMITIVE_INDEX) {
-            eprintln!("SKIPPED: this device does not number triangles");
+            crate::testing::skipped("this device does not number triangles");
             return;
         }
         let head = dome();
