@@ -1,5 +1,6 @@
 //! glTF files of other programs, and the published schema of our extension.
 
+use std::io::Write;
 use std::path::Path;
 
 use glam::Vec3;
@@ -413,7 +414,8 @@ fn an_exported_animation_is_the_performance() {
 #[test]
 fn published_samples_are_read() {
     let Ok(shared) = std::env::var("RUBOR_SHARED") else {
-        eprintln!("SKIPPED: RUBOR_SHARED is not set, the sample files were not read");
+        writeln!(std::io::stderr(), "SKIPPED: RUBOR_SHARED is not set, the sample files were not read")
+            .expect("stderr is open");
         return;
     };
     let mut found = 0;

@@ -1,6 +1,7 @@
 //! The default head from MakeHuman data. `RUBOR_MAKEHUMAN` names the folder with `mpfb2/` and `faceunits01/`.
 
 use std::collections::HashMap;
+use std::io::Write;
 
 use rubor_assets::convert::occlusion;
 use rubor_assets::import::makehuman::{Options, import};
@@ -10,7 +11,8 @@ use rubor_rig::landmarks::{MIDDLE, PAIRED, paired};
 
 fn head(subdivide: u32) -> Option<Head> {
     let Ok(data) = std::env::var("RUBOR_MAKEHUMAN") else {
-        eprintln!("SKIPPED: RUBOR_MAKEHUMAN is not set, the default head was not built");
+        writeln!(std::io::stderr(), "SKIPPED: RUBOR_MAKEHUMAN is not set, the default head was not built")
+            .expect("stderr is open");
         return None;
     };
     let options = Options { data: data.into(), subdivide, occlusion_rays: 8, ..Options::default() };
@@ -93,7 +95,8 @@ fn missing_data_and_wrong_options_are_errors() {
 #[test]
 fn ambient_visibility_follows_jaw_and_lids() {
     let Ok(data) = std::env::var("RUBOR_MAKEHUMAN") else {
-        eprintln!("SKIPPED: RUBOR_MAKEHUMAN is not set, the default head was not built");
+        writeln!(std::io::stderr(), "SKIPPED: RUBOR_MAKEHUMAN is not set, the default head was not built")
+            .expect("stderr is open");
         return;
     };
     let options = Options { data: data.into(), subdivide: 0, occlusion_rays: 0, ..Options::default() };

@@ -1,6 +1,7 @@
 //! OBJ sets: a small one, broken ones, and the ICT head.
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use rubor_assets::import::obj::{GroupBy, read_polygons};
@@ -98,7 +99,8 @@ fn units_are_read() {
 #[test]
 fn the_ict_head_is_understood() {
     let Ok(shared) = std::env::var("RUBOR_SHARED") else {
-        eprintln!("SKIPPED: RUBOR_SHARED is not set, the ICT head was not imported");
+        writeln!(std::io::stderr(), "SKIPPED: RUBOR_SHARED is not set, the ICT head was not imported")
+            .expect("stderr is open");
         return;
     };
     let folder = Path::new(&shared).join("heads/ict");

@@ -9,6 +9,7 @@ use rubor_rig::head::{BlendShape, Distribution, Head, WrinkleZone};
 use rubor_rig::map::Map;
 use rubor_rig::names::ARKIT;
 use rubor_rig::timeline::{Ease, LightKind, Sequence, Track, sequence_schema};
+use std::io::Write;
 
 /// Zones of papers/004 table 8.1 in the order of its columns.
 const TABLE_ZONES: [&str; 8] = [
@@ -702,7 +703,11 @@ fn keys_after_the_end_are_noted() {
 #[test]
 fn the_ict_head_plays_the_default_rig() {
     let Ok(shared) = std::env::var("RUBOR_SHARED") else {
-        eprintln!("SKIPPED: RUBOR_SHARED is not set, so the names of the ICT FaceKit head are not read");
+        writeln!(
+            std::io::stderr(),
+            "SKIPPED: RUBOR_SHARED is not set, so the names of the ICT FaceKit head are not read"
+        )
+        .expect("stderr is open");
         return;
     };
     let folder = std::path::Path::new(&shared).join("heads/ict");

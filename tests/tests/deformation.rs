@@ -12,6 +12,7 @@ use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::timeline::Sequence;
+use std::io::Write;
 
 /// Largest distance between two of the three, in heights of the head.
 const TOLERANCE: f32 = 1e-5;
@@ -26,7 +27,7 @@ fn renderer() -> Option<Renderer> {
         Ok(renderer) => Some(renderer),
         Err(error) => {
             assert!(std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: {error}");
-            eprintln!("SKIPPED: {error}");
+            writeln!(std::io::stderr(), "SKIPPED: {error}").expect("stderr is open");
             None
         }
     }

@@ -1,5 +1,6 @@
 //! The maps as a whole, on a made-up head: a cylinder with canonical landmarks and a texture cut down its front.
 
+use std::io::Write;
 use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
@@ -396,7 +397,8 @@ fn relief_and_shine_are_calm_beside_the_t_zone() {
 #[test]
 fn the_ears_of_every_character_are_bald() {
     let Ok(data) = std::env::var("RUBOR_MAKEHUMAN") else {
-        eprintln!("SKIPPED: RUBOR_MAKEHUMAN is not set, no character was built");
+        writeln!(std::io::stderr(), "SKIPPED: RUBOR_MAKEHUMAN is not set, no character was built")
+            .expect("stderr is open");
         return;
     };
     for character in &crate::import::makehuman::CHARACTERS {

@@ -1,3 +1,4 @@
+use std::io::Write;
 use std::path::Path;
 
 use super::filter::{reduce, resample, smooth};
@@ -386,7 +387,11 @@ fn corrupted_recordings_never_panic() {
 #[test]
 fn real_takes_of_live_link_face() {
     let Some(shared) = std::env::var_os("RUBOR_SHARED") else {
-        eprintln!("SKIPPED: RUBOR_SHARED is not set, the recordings of Live Link Face were not read");
+        writeln!(
+            std::io::stderr(),
+            "SKIPPED: RUBOR_SHARED is not set, the recordings of Live Link Face were not read"
+        )
+        .expect("stderr is open");
         return;
     };
     let folder = Path::new(&shared).join("capture");
