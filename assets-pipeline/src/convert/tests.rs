@@ -105,6 +105,7 @@ fn albedo_goes_to_chromophores_and_back() {
         map: Map { values: codes, ..albedo.clone() },
         alpha: None,
         kind: SampleKind::U8,
+        notes: Vec::new(),
     };
     let read = chromophores::linear_albedo(&image, chromophores::AlbedoEncoding::Automatic, 1.0).unwrap();
     let found = chromophores::convert(&read, &image.mask(), &lookup, 3.0).unwrap();
