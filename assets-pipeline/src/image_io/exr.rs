@@ -183,8 +183,8 @@ fn choose(
     }
     let mut notes = Vec::new();
     if !choices.is_empty() && options.layer.is_none() {
-        let title = if choice.title.is_empty() { "the unnamed layer" } else { choice.title.as_str() };
-        notes.push(format!("read {title}; the file also holds {}", titles(&choices)));
+        let title = if choice.title.is_empty() { "(unnamed)" } else { choice.title.as_str() };
+        notes.push(format!("layer {title} was taken; the file also holds {}", titles(&choices)));
     }
     if !choice.layer.unread.is_empty() {
         notes.push(format!("channels that were not read: {}", list(&choice.layer.unread)));

@@ -12,10 +12,13 @@ use image::codecs::png::PngEncoder;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
+/// Value of a channel at a column and a row.
+type Samples = Box<dyn Fn(usize, usize) -> f32>;
+
 /// A part of an EXR: channels with a value for each texel, counted from the corner of the data.
 pub(crate) struct Part<'a> {
     pub(crate) name: Option<&'a str>,
-    pub(crate) channels: Vec<(String, Box<dyn Fn(usize, usize) -> f32>)>,
+    pub(crate) channels: Vec<(String, Samples)>,
     pub(crate) position: [i32; 2],
     pub(crate) size: [usize; 2],
     pub(crate) is_cube_map: bool,
@@ -65,7 +68,7 @@ pub(crate) fn part<'a>(
     size: [usize; 2],
     value: impl Fn(usize, usize, usize) -> f32 + Copy + 'static,
 ) -> Part<'a> {
-    let channel = |(c, n): (usize, &&str)| -> (String, Box<dyn Fn(usize, usize) -> f32>) {
+    let channel = |(c, n): (usize, &&str)| -> (String, Samples) {
         ((*n).to_owned(), Box::new(move |x, y| value(c, x, y)))
     };
     Part {

@@ -80,7 +80,11 @@ fn exr_layers_are_chosen_by_name_or_with_a_note() {
     let normals =
         decode(&bytes, &ReadOptions { purpose: Purpose::Normals, ..ReadOptions::default() }).unwrap();
     assert_eq!(normals.map.texel(0, 0), [4.0, 5.0, 6.0]);
-    assert!(normals.alpha.is_none() && normals.notes[0].contains("read View.Normal"), "{:?}", normals.notes);
+    assert!(
+        normals.alpha.is_none() && normals.notes[0].contains("layer View.Normal was taken"),
+        "{:?}",
+        normals.notes
+    );
     for name in ["normal", "View.Normal", "VIEW.NORMAL"] {
         let image = decode(&bytes, &layer(name)).unwrap();
         assert_eq!(image.map.texel(0, 0), [4.0, 5.0, 6.0], "{name}");
@@ -109,7 +113,7 @@ fn exr_parts_are_chosen_by_name_or_with_a_note() {
     let first = read(&bytes);
     assert_eq!(first.map.texel(0, 0), [0.0, 1.0, 2.0]);
     assert!(
-        first.notes[0].contains("read beauty") && first.notes[0].contains("normals"),
+        first.notes[0].contains("layer beauty") && first.notes[0].contains("normals"),
         "{:?}",
         first.notes
     );
@@ -117,7 +121,7 @@ fn exr_parts_are_chosen_by_name_or_with_a_note() {
     let by_purpose =
         decode(&bytes, &ReadOptions { purpose: Purpose::Normals, ..ReadOptions::default() }).unwrap();
     assert_eq!(by_purpose.map.texel(0, 0), [10.0, 11.0, 12.0]);
-    assert!(by_purpose.notes[0].contains("read normals"));
+    assert!(by_purpose.notes[0].contains("layer normals"));
 }
 
 #[test]
