@@ -28,22 +28,23 @@ pub(super) fn read(file: &Path, bytes: &[u8], limits: &Limits) -> Result<Option<
         ColorType::RGB(bits) => (3, bits, false),
         ColorType::RGBA(bits) => (4, bits, true),
         ColorType::GrayA(bits) => (2, bits, true),
-        ColorType::Multiband { bit_depth, num_samples } if num_samples <= 4 => {
+        ColorType::Multiband { bit_depth, num_samples } => {
             let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples).map_err(decode)?;
             // 1 and 2 are associated and unassociated alpha (TIFF 6.0, section 18).
-            let has_alpha = extra.is_some_and(|kinds| matches!(kinds[..], [1 | 2]));
+            let has_alpha = num_samples > 1 && extra.is_some_and(|kinds| matches!(kinds[..], [1 | 2]));
             (usize::from(num_samples), bit_depth, has_alpha)
-        }
-        ColorType::Multiband { num_samples, .. } => {
-            return Err(ImageError::Content {
-                file: file.to_owned(),
-                at: "samples".into(),
-                found: format!("{num_samples} samples per texel"),
-                expected: "1 to 4".into(),
-            });
         }
         _ => return Ok(None),
     };
+    let shown = channels.saturating_sub(usize::from(has_alpha));
+    if !(1..=3).contains(&shown) {
+        return Err(ImageError::Content {
+            file: file.to_owned(),
+            at: "samples".into(),
+            found: format!("{channels} samples per texel"),
+            expected: "1 to 3, and alpha".into(),
+        });
+    }
     let (width, height) = decoder.dimensions().map_err(decode)?;
     let bytes_per_pixel = channels as u64 * (u64::from(bits).div_ceil(8) + 4);
     let size = (u64::from(width), u64::from(height));

@@ -210,6 +210,8 @@ fn tiff_of_any_sample_type_is_read() {
     assert_eq!(with_alpha.alpha.unwrap().texel(1, 0), [3.0]);
     let rgba = read(&Tiff { samples: 4, extra: &[2], ..rgb }.bytes(&floats(48)));
     assert_eq!((rgba.map.texel(1, 0), rgba.alpha.unwrap().texel(1, 0)), (&[4.0, 5.0, 6.0][..], &[7.0][..]));
+    let four = Tiff { samples: 4, extra: &[0, 0, 0], ..grey }.bytes(&floats(48));
+    assert!(decode(&four, &ReadOptions::default()).unwrap_err().contains("4 samples per texel"));
     let slopes = read(&Tiff { samples: 2, extra: &[0], ..grey }.bytes(&floats(24)));
     assert_eq!((slopes.map.channels, slopes.map.texel(1, 0)), (2, &[2.0, 3.0][..]));
     let pages = read(&Tiff { more_pages: true, ..grey }.bytes(&floats(12)));
