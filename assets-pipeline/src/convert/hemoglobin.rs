@@ -12,6 +12,8 @@ use rubor_rig::hemoglobin::{self, DISTRIBUTION_SIZE};
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, fill_unmapped};
 use rubor_rig::skin::chromophores::MAX_HEMOGLOBIN;
+use serde::de::IntoDeserializer;
+use serde::de::value::StrDeserializer;
 use serde::{Deserialize, Serialize};
 
 use super::ConvertError;
@@ -52,17 +54,12 @@ impl FromStr for HemoglobinUnit {
     type Err = ConvertError;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        match name {
-            "automatic" => Ok(Self::Automatic),
-            "normalized" => Ok(Self::Normalized),
-            "volume-fraction" => Ok(Self::VolumeFraction),
-            "percent" => Ok(Self::Percent),
-            other => Err(ConvertError::argument(
-                "unit",
-                format!("{other:?}"),
-                "automatic, normalized, volume-fraction or percent",
-            )),
-        }
+        // The names are those of manifests.
+        let names: StrDeserializer<'_, serde::de::value::Error> = name.into_deserializer();
+        Self::deserialize(names).map_err(|_| {
+            let expected = "automatic, normalized, volume-fraction or percent";
+            ConvertError::argument("unit", format!("{name:?}"), expected)
+        })
     }
 }
 
