@@ -28,9 +28,11 @@
 pub mod check;
 pub mod compare;
 pub mod convert;
+pub mod environment;
 pub mod error;
 pub mod export;
 pub mod facial_appearance;
+mod files;
 pub mod image_io;
 pub mod import;
 pub mod poly;

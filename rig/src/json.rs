@@ -8,6 +8,8 @@
 //!
 //! Allowed beyond JSON: `//` and `/* */` comments, trailing commas. Not allowed, unlike in some readers: the same key
 //! twice, as the first would be silently lost.
+//!
+//! Ranges are checked where values are bound, not by a derive (`garde`): those know no place in the text.
 
 use std::fmt::Display;
 use std::sync::Arc;

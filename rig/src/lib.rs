@@ -37,6 +37,7 @@ pub mod lights;
 pub mod map;
 pub mod mask;
 pub mod names;
+pub mod random;
 pub mod skin;
 pub mod strain;
 pub mod timeline;

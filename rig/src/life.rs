@@ -12,6 +12,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::random::{mixed, unit};
 use crate::timeline::Track;
 
 /// Gaze and pupils.
@@ -110,14 +111,11 @@ const LAG_S: f64 = 0.008;
 const FIXATION_S: f64 = 0.85;
 const JUMP_S: f64 = 0.035;
 
-/// A number from 0 to 1 for the cell of time `cell` of a purpose (finaliser of splitmix64; G. Steele et al. 2014).
+/// A number from 0 to 1 for the cell of time `cell` of a purpose.
 fn random(seed: u32, purpose: u32, cell: i64) -> f64 {
-    let mut z = (u64::from(seed) << 32 | u64::from(purpose)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    let z = (u64::from(seed) << 32 | u64::from(purpose)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
         ^ (cell as u64).wrapping_mul(0xd1b5_4a32_d192_ed03);
-    for (shift, factor) in [(30, 0xbf58_476d_1ce4_e5b9u64), (27, 0x94d0_49bb_1331_11eb)] {
-        z = (z ^ (z >> shift)).wrapping_mul(factor);
-    }
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    unit(mixed(z))
 }
 
 fn smooth(u: f64) -> f64 {

@@ -1,4 +1,7 @@
 //! A bounding volume hierarchy for occlusion rays.
+//!
+//! Ours: 1.1 s for 10^6 rays on 80 000 triangles where the crate `bvh` 0.13 takes 1.4 s (`examples/bvh_time.rs`), and
+//! its triangle test loses 3 % of the hits, those on the smallest triangles.
 
 use glam::Vec3;
 
@@ -111,12 +114,8 @@ mod tests {
 
     #[test]
     fn agrees_with_testing_every_triangle() {
-        let mut state = 1_u32;
-        let mut next = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 24) as f32 - 0.5
-        };
-        let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+        let mut random = fastrand::Rng::with_seed(1);
+        let mut vector = |scale: f32| Vec3::from_array([0; 3].map(|_| random.f32() - 0.5)) * scale;
         let triangles: Vec<[Vec3; 3]> = (0..200)
             .map(|_| {
                 let center = vector(2.0);

@@ -12,6 +12,8 @@ use rubor_rig::hemoglobin::{self, DISTRIBUTION_SIZE};
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, fill_unmapped};
 use rubor_rig::skin::chromophores::MAX_HEMOGLOBIN;
+use serde::de::IntoDeserializer;
+use serde::de::value::StrDeserializer;
 use serde::{Deserialize, Serialize};
 
 use super::ConvertError;
@@ -52,17 +54,12 @@ impl FromStr for HemoglobinUnit {
     type Err = ConvertError;
 
     fn from_str(name: &str) -> Result<Self, Self::Err> {
-        match name {
-            "automatic" => Ok(Self::Automatic),
-            "normalized" => Ok(Self::Normalized),
-            "volume-fraction" => Ok(Self::VolumeFraction),
-            "percent" => Ok(Self::Percent),
-            other => Err(ConvertError::argument(
-                "unit",
-                format!("{other:?}"),
-                "automatic, normalized, volume-fraction or percent",
-            )),
-        }
+        // The names are those of manifests.
+        let names: StrDeserializer<'_, serde::de::value::Error> = name.into_deserializer();
+        Self::deserialize(names).map_err(|_| {
+            let expected = "automatic, normalized, volume-fraction or percent";
+            ConvertError::argument("unit", format!("{name:?}"), expected)
+        })
     }
 }
 
@@ -143,6 +140,8 @@ pub struct HemoglobinMaps {
     /// Maps without any contrast where they are mapped: their scale is 0, 1 or the largest, as the rules of
     /// [`rubor_rig::hemoglobin`] say.
     pub constant: Vec<String>,
+    /// What the readers of the images chose, left out or turned, with the file.
+    pub notes: Vec<String>,
 }
 
 /// Reads a manifest.
@@ -166,6 +165,8 @@ pub struct Fractions {
     pub mask: Mask,
     /// Mapped texels that were clamped to 0..0.32.
     pub clamped_texels: usize,
+    /// Notes of the image's reader.
+    pub notes: Vec<String>,
 }
 
 /// Reads a map of volume fractions.
@@ -203,7 +204,7 @@ pub fn read_fractions(file: &Path, calibration: Calibration) -> Result<Fractions
             "another unit or calibration (units: automatic, normalized, volume-fraction, percent)",
         ));
     }
-    Ok(Fractions { map, mask, clamped_texels })
+    Ok(Fractions { map, mask, clamped_texels, notes: image.notes })
 }
 
 /// Converts all maps of a manifest whose files are relative to `folder`.
@@ -235,8 +236,12 @@ pub fn convert(
     let (mut neutral, neutral_name) = neutral_of(manifest, folder, head)?;
     let (width, height) = (neutral.map.width, neutral.map.height);
     let mut mask = neutral.mask.clone();
+    let mut notes = Vec::new();
+    let mut note = |file: &str, found: &[String]| notes.extend(found.iter().map(|n| format!("{file}: {n}")));
+    note(&neutral_name, &neutral.notes);
     if let Some(file) = &manifest.mask {
         let image = load_image(&folder.join(file))?;
+        note(&file.display().to_string(), &image.notes);
         image.require_size(width, height)?;
         mask = mask.and(&Mask::above(&image.require_grey()?, 0, 0.5));
     }
@@ -266,6 +271,7 @@ pub fn convert(
         let file = folder.join(&source.file);
         let target = read_fractions(&file, calibration)?;
         clamped_texels += target.clamped_texels;
+        note(&source.file.display().to_string(), &target.notes);
         let target_mask = target_mask(&file, &target, &mask, head)?;
         if is_constant(&target.map, &target_mask) {
             constant.push(source.name.clone());
@@ -291,6 +297,7 @@ pub fn convert(
         radius_px,
         clamped_texels,
         constant,
+        notes,
     })
 }
 
@@ -316,7 +323,10 @@ fn neutral_of(
         return Err(ConvertError::argument("neutral", found, expected));
     };
     let mask = Mask::full(map.width, map.height);
-    Ok((Fractions { map, mask, clamped_texels: 0 }, format!("hemoglobin of head {:?}", head.name)))
+    Ok((
+        Fractions { map, mask, clamped_texels: 0, notes: Vec::new() },
+        format!("hemoglobin of head {:?}", head.name),
+    ))
 }
 
 /// Mapped texels of a target, in its own size.

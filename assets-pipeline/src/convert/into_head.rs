@@ -233,6 +233,7 @@ mod tests {
             radius_px: 1,
             clamped_texels: 0,
             constant: Vec::new(),
+            notes: Vec::new(),
         };
         assert_eq!(put_hemoglobin(&mut head, maps, &origin()).unwrap(), ["fear"]);
         assert!(head.validate().is_ok());

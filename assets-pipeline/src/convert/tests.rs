@@ -1,5 +1,3 @@
-use std::path::PathBuf;
-
 use rubor_rig::color::{ciede2000, lab_from_rec709, srgb_encode};
 use rubor_rig::map::Map;
 use rubor_rig::mask::Mask;
@@ -7,12 +5,6 @@ use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
 
 use super::{chromophores, hemoglobin, normals};
 use crate::image_io::{LoadedImage, SampleKind, load_image, save_image};
-
-fn folder(name: &str) -> PathBuf {
-    let path = std::env::temp_dir().join(format!("rubor-convert-{}-{name}", std::process::id()));
-    std::fs::create_dir_all(&path).unwrap();
-    path
-}
 
 fn map(width: u32, height: u32, value: impl Fn(u32, u32) -> f32) -> Map {
     let values =
@@ -26,7 +18,8 @@ fn texture(x: u32, y: u32) -> f32 {
 
 #[test]
 fn a_manifest_of_mixed_files_becomes_distributions() {
-    let folder = folder("hemoglobin");
+    let kept = tempfile::tempdir().unwrap();
+    let folder = kept.path();
     // The same blood in three units and formats: 5 % with texture, and twice the contrast at 8 %.
     let neutral = map(128, 96, |x, y| 0.05 + 0.02 * texture(x, y));
     let anger = map(128, 96, |x, y| 0.08 + 0.04 * texture(x, y));
@@ -48,7 +41,7 @@ fn a_manifest_of_mixed_files_becomes_distributions() {
     }"#;
     std::fs::write(folder.join("maps.json"), text).unwrap();
     let manifest = hemoglobin::read_manifest(&folder.join("maps.json")).unwrap();
-    let maps = hemoglobin::convert(&manifest, &folder, None).unwrap();
+    let maps = hemoglobin::convert(&manifest, folder, None).unwrap();
     assert_eq!((maps.distributions.len(), maps.clamped_texels), (3, 0));
     for d in &maps.distributions {
         // 8 bits of 0..0.32 are steps of 0.00126, a tenth of the deviation: 1 % of the scale.
@@ -63,12 +56,12 @@ fn a_manifest_of_mixed_files_becomes_distributions() {
     let written = hemoglobin::write(&maps, &folder.join("out")).unwrap();
     assert_eq!(written.len(), 8);
     assert_eq!(load_image(&folder.join("out/neutral.exr")).unwrap().map, neutral);
-    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
 fn bad_hemoglobin_input_is_explained() {
-    let folder = folder("hemoglobin-errors");
+    let kept = tempfile::tempdir().unwrap();
+    let folder = kept.path();
     save_image(&folder.join("n.exr"), &map(16, 8, |_, _| 0.05), SampleKind::F32).unwrap();
     save_image(&folder.join("mask.png"), &map(8, 8, |_, _| 1.0), SampleKind::U8).unwrap();
     save_image(&folder.join("black.png"), &map(16, 8, |_, _| 0.0), SampleKind::U8).unwrap();
@@ -76,7 +69,7 @@ fn bad_hemoglobin_input_is_explained() {
         let text = format!("{{ \"neutral\": \"n.exr\", {fields} }}");
         std::fs::write(folder.join("m.json"), text).unwrap();
         hemoglobin::read_manifest(&folder.join("m.json"))
-            .and_then(|m| hemoglobin::convert(&m, &folder, None))
+            .and_then(|m| hemoglobin::convert(&m, folder, None))
             .unwrap_err()
             .to_string()
     };
@@ -89,7 +82,6 @@ fn bad_hemoglobin_input_is_explained() {
     assert!(message(twice).contains("name \"a\""));
     assert!(message(r#""distributions": [{"name": "a", "file": "gone.exr"}]"#).contains("gone.exr"));
     assert!(message("\"size\": 0").contains("size"));
-    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
@@ -105,6 +97,7 @@ fn albedo_goes_to_chromophores_and_back() {
         map: Map { values: codes, ..albedo.clone() },
         alpha: None,
         kind: SampleKind::U8,
+        notes: Vec::new(),
     };
     let read = chromophores::linear_albedo(&image, chromophores::AlbedoEncoding::Automatic, 1.0).unwrap();
     let found = chromophores::convert(&read, &image.mask(), &lookup, 3.0).unwrap();

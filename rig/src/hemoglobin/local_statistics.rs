@@ -295,12 +295,11 @@ fn plus(mut total: [u64; LANES], prefix: &[u64], gap: usize) -> [u64; LANES] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random;
 
     /// Values that look random, 0..1.
     fn noise(i: usize) -> f64 {
-        let mut z = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5555;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        (z >> 11) as f64 / (1u64 << 53) as f64
+        random::unit(random::mixed(i as u64 ^ 0x5555))
     }
 
     /// Equation 7.1 as it stands, in f64 with the mean taken off first.

@@ -1,14 +1,11 @@
 use super::histogram_matching::{map_difference, match_locally};
 use super::*;
+use crate::random;
 
 /// Standard normal deviates from a counter (Box and Muller 1958).
 fn normal(i: usize) -> f32 {
-    let uniform = |k: u64| {
-        let mut z = k.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0x1234_5678);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    };
+    let uniform =
+        |k: u64| random::unit(random::mixed(k.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0x1234_5678)));
     let (a, b) = (uniform(2 * i as u64), uniform(2 * i as u64 + 1));
     ((-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()) as f32
 }

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
+use libm::erf;
 use serde::{Deserialize, Serialize};
 
-use super::numerics::erf;
 use crate::error::SkinError;
 
 /// One term `weight * G(variance, r)`, `G(v, r) = exp(-r^2 / (2 v)) / (2 pi v)` (d'Eon, Luebke and Enderton 2007).

@@ -10,11 +10,12 @@
 //!
 //! The light of a cell is exact: it follows from the profile's CDF (`RadialProfile::quadrant_cdf`).
 
+use libm::erf;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 
 use super::gaussians::DEON_SIX;
-use super::numerics::{erf, invert_cdf, levenberg_marquardt};
+use super::numerics::{invert_cdf, levenberg_marquardt};
 use super::profile::{Profile, RadialProfile};
 use crate::error::SkinError;
 

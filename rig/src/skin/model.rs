@@ -63,6 +63,7 @@ impl ProfileModel {
         Self::MonteCarlo,
     ];
 
+    // `strum` would write this table and `ALL`, but not the message with the nearest name: too little for a crate.
     /// The name in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {

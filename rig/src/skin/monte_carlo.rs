@@ -22,6 +22,7 @@ use super::medium::{ETA, Medium, fresnel_from_inside};
 use super::profile::RadialProfile;
 use super::table::RadialTable;
 use crate::error::SkinError;
+use crate::random::SplitMix64;
 
 /// Photons are dealt to this many independent streams; the spread of their sums gives the standard errors.
 const BATCHES: u64 = 64;
@@ -511,22 +512,16 @@ fn interpolation(albedo: f64) -> [f64; ALBEDO_NODES] {
     raw.map(|w| w / sum)
 }
 
-/// xoshiro256++ (Blackman and Vigna 2019), seeded through splitmix64.
+/// xoshiro256++ (Blackman and Vigna 2019), seeded through [`SplitMix64`]: kept walks hold its sequence, and its period
+/// of 2^256 leaves every batch a stream of its own.
 struct Random {
     state: [u64; 4],
 }
 
 impl Random {
     fn new(seed: u64, stream: u64) -> Self {
-        let mut z = seed ^ stream.wrapping_mul(0xd1342543de82ef95);
-        let next = || {
-            z = z.wrapping_add(0x9e3779b97f4a7c15);
-            let a = (z ^ (z >> 30)).wrapping_mul(0xbf58476d1ce4e5b9);
-            let b = (a ^ (a >> 27)).wrapping_mul(0x94d049bb133111eb);
-            b ^ (b >> 31)
-        };
-        let mut next = next;
-        Self { state: std::array::from_fn(|_| next()) }
+        let mut seeds = SplitMix64(seed ^ stream.wrapping_mul(0xd1342543de82ef95));
+        Self { state: std::array::from_fn(|_| seeds.bits()) }
     }
 
     fn bits(&mut self) -> u64 {

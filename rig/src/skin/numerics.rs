@@ -34,33 +34,6 @@ pub(crate) fn integrate(rule: &[(f64, f64)], a: f64, b: f64, mut f: impl FnMut(f
     rule.iter().map(|&(x, w)| w * f(mid + half * x)).sum::<f64>() * half
 }
 
-/// Error function; the absolute error is below 1e-14.
-///
-/// Maclaurin series for small arguments, Laplace's continued fraction of erfc beyond.
-pub(crate) fn erf(x: f64) -> f64 {
-    let a = x.abs();
-    if a < 2.5 {
-        let (mut term, mut sum, mut n) = (a, a, 0.0);
-        while term.abs() > 1e-17 * sum {
-            n += 1.0;
-            term *= -a * a / n;
-            sum += term / (2.0 * n + 1.0);
-            if n > 200.0 {
-                break;
-            }
-        }
-        (sum * 2.0 / PI.sqrt()).copysign(x)
-    } else if a < 6.5 {
-        let mut fraction = a;
-        for k in (1..=80).rev() {
-            fraction = a + 0.5 * k as f64 / fraction;
-        }
-        (1.0 - (-a * a).exp() / (PI.sqrt() * fraction)).copysign(x)
-    } else {
-        1f64.copysign(x)
-    }
-}
-
 /// The radius where a non-decreasing `cdf` (0 at 0, 1 at infinity) passes `u`, by bracketing and bisection.
 ///
 /// `scale` is a typical radius. `u` at or above what `cdf` reaches gives infinity.
@@ -206,17 +179,6 @@ mod tests {
         let rule = gauss_legendre(8);
         let value = integrate(&rule, 1.0, 3.0, |x| x.powi(15));
         assert!((value - (3f64.powi(16) - 1.0) / 16.0).abs() < 1e-7 * value);
-    }
-
-    #[test]
-    fn erf_matches_published_values() {
-        // Abramowitz and Stegun 1964, table 7.1 and 7.3.
-        for (x, y) in [(0.5, 0.5204998778), (1.0, 0.8427007929), (2.0, 0.9953222650), (3.0, 0.9999779095)] {
-            assert!((erf(x) - y).abs() < 1e-10, "{x}");
-            assert_eq!(erf(-x), -erf(x));
-        }
-        assert!((erf(2.5 - 1e-12) - erf(2.5 + 1e-12)).abs() < 1e-13);
-        assert_eq!(erf(40.0), 1.0);
     }
 
     #[test]

@@ -10,16 +10,23 @@ use super::Options;
 use crate::error::ImportError;
 use crate::poly::Shape;
 
+/// A target that moves every point of the base mesh has 1 MB of text; a few kilobytes of gzip can hold gigabytes.
+const LARGEST_TEXT: u64 = 64 << 20;
+
 /// Reads a target. Points are below `point_count`.
 pub(super) fn read(path: &Path, point_count: usize) -> Result<Vec<(u32, Vec3)>, ImportError> {
     let bytes = fs::read(path).map_err(ImportError::read(path))?;
     let mut text = String::new();
     let decoded = if path.extension().is_some_and(|e| e == "gz") {
-        flate2::read::GzDecoder::new(bytes.as_slice()).read_to_string(&mut text)
+        flate2::read::GzDecoder::new(bytes.as_slice()).take(LARGEST_TEXT + 1).read_to_string(&mut text)
     } else {
-        bytes.as_slice().read_to_string(&mut text)
+        bytes.as_slice().take(LARGEST_TEXT + 1).read_to_string(&mut text)
     };
     decoded.map_err(ImportError::read(path))?;
+    if text.len() as u64 > LARGEST_TEXT {
+        let found = format!("more than {} MiB of text", LARGEST_TEXT >> 20);
+        return Err(ImportError::content(path, "size", found, "a target"));
+    }
     let mut offsets = Vec::new();
     for (i, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -138,6 +145,21 @@ fn product<'a>(axes: &[&[(&'a str, f32)]]) -> Vec<(Vec<&'a str>, f32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_gzip_that_unfolds_without_end_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bomb.target.gz");
+        let file = fs::File::create(&path).unwrap();
+        let mut encoder = flate2::write::GzEncoder::new(file, flate2::Compression::best());
+        let line = b"# nothing but remarks\n".repeat(1 << 16);
+        for _ in 0..=LARGEST_TEXT / line.len() as u64 {
+            std::io::Write::write_all(&mut encoder, &line).unwrap();
+        }
+        encoder.finish().unwrap();
+        let message = read(&path, 3).unwrap_err().to_string();
+        assert!(message.contains("64 MiB") && message.contains("bomb.target.gz"), "{message}");
+    }
 
     #[test]
     fn axis_weights_are_linear_between_words_and_sum_to_one() {

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::coefficients::{Medium, dermis, epidermis, stratum_corneum};
 use super::layers::fresnel_reflectance;
 use super::{ChromophoreModel, spectral_weights};
+use crate::random::SplitMix64;
 
 /// How photons walk.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,17 +23,13 @@ pub struct Walk {
     pub mean_cosine: f64,
 }
 
-/// Counter-based random numbers (SplitMix64, Steele, Lea and Flood 2014).
-struct Random(u64);
+/// Random numbers whose logarithm is finite.
+struct Random(SplitMix64);
 
 impl Random {
     /// Uniform in (0, 1].
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0) + f64::EPSILON / 4.0
+        self.0.uniform() + f64::EPSILON / 4.0
     }
 }
 
@@ -50,7 +47,7 @@ pub fn reflectance(
         dermis(model, wavelength_nm, hemoglobin),
     ]
     .map(|m| Medium { scattering_per_mm: m.scattering_per_mm / (1.0 - walk.mean_cosine), ..m });
-    let mut random = Random(walk.seed ^ wavelength_nm.to_bits());
+    let mut random = Random(SplitMix64(walk.seed ^ wavelength_nm.to_bits()));
     let entering = 1.0 - fresnel_reflectance(1.0, 1.0 / model.eta);
     let (mut sum, mut sum2) = (0.0, 0.0);
     for _ in 0..walk.photons {
