@@ -33,5 +33,6 @@ pub mod export;
 pub mod facial_appearance;
 pub mod image_io;
 pub mod import;
+pub mod notes;
 pub mod poly;
 pub mod synthesize;

@@ -20,15 +20,23 @@ pub fn build_head(
 ) -> (Head, Vec<u32>) {
     let mut new_point = vec![u32::MAX; mesh.points.len()];
     let mut out = Mesh::default();
-    for (i, (_, part_name, material)) in parts.iter().enumerate() {
-        if parts[..i].iter().any(|p| p.1 == *part_name) {
-            continue;
-        }
+    let mut faces_of_group: Vec<Vec<usize>> = vec![Vec::new(); mesh.groups.len()];
+    (0..mesh.face_count()).for_each(|f| faces_of_group[mesh.face_groups[f] as usize].push(f));
+    let group_index: HashMap<&str, usize> =
+        mesh.groups.iter().enumerate().map(|(i, g)| (&g[..], i)).collect();
+    let mut groups_of_part: HashMap<&str, Vec<usize>> = HashMap::new();
+    for (group, part, _) in parts {
+        let groups = groups_of_part.entry(part).or_default();
+        groups.extend(group_index.get(group).filter(|g| !groups.contains(g)));
+    }
+    for (_, part_name, material) in parts {
+        // The first mention of a part makes it.
+        let Some(groups) = groups_of_part.remove(part_name) else { continue };
         let start = out.triangles.len() as u32;
         let mut vertex_of: HashMap<(u32, u32), u32> = HashMap::new(); // parts share points, not vertices
-        let members: Vec<bool> =
-            mesh.groups.iter().map(|g| parts.iter().any(|p| p.0 == g && p.1 == *part_name)).collect();
-        for f in (0..mesh.face_count()).filter(|f| members[mesh.face_groups[*f] as usize]) {
+        let mut faces: Vec<usize> = groups.iter().flat_map(|g| &faces_of_group[*g]).copied().collect();
+        faces.sort_unstable();
+        for f in faces {
             let mut vertex = |c: Corner| {
                 let point = &mut new_point[c.point as usize];
                 if *point == u32::MAX {
