@@ -35,5 +35,6 @@ pub mod facial_appearance;
 mod files;
 pub mod image_io;
 pub mod import;
+pub mod notes;
 pub mod poly;
 pub mod synthesize;

@@ -2,11 +2,15 @@
 //!
 //! ```text
 //! Weights (expressions, states, single shapes)
-//!   --sum-->  shapes --clamp 0..1--> combinations --clamp--> in-betweens --> FaceState.shapes
+//!   --sum-->  shapes --limits--> combinations --limits--> in-betweens --limits--> FaceState.shapes
 //!   --sum-->  zones --clamp 0..1------------------------------------------> FaceState.zones
 //!   --sum-->  distributions --if over 1: divided by the sum---------------> FaceState.distributions
 //!   1 + sum of weight (scale - 1), at least 0 ----------------------------> FaceState.hemoglobin_scale
 //! ```
+//!
+//! Limits: a weight is held in 0..1 where expressions, states, combinations and in-betweens add up. A track of a single
+//! shape passes as it was authored, also below 0 and above 1, as glTF allows: the limits of that shape reach as far as
+//! its track. Combinations see their drivers in 0..1; in-betweens continue their first and last segment.
 //!
 //! Source: zones from papers/004 section 8.2 (negative weights, clamped sum), distributions from eq. 7.6 (weights sum to
 //! one with the neutral), global scale from section 7.7. Ours: how several distributions share when they ask for more
@@ -29,8 +33,33 @@ pub struct Weights {
     pub expressions: Vec<f32>,
     /// One a state, 0 to 2.
     pub states: Vec<f32>,
-    /// One a shape of the head, added to what the expressions do.
+    /// One a shape of the head, added to what the expressions do. Any finite number: the sum is held in 0..1 only as
+    /// far as this weight itself lies there.
     pub shapes: Vec<f32>,
+}
+
+/// Range that the weight of a shape is held in: 0..1, and as far beyond as authored weights go.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    low: f32,
+    high: f32,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { low: 0.0, high: 1.0 }
+    }
+}
+
+impl Limits {
+    pub(crate) fn include(&mut self, authored: f32) {
+        self.low = self.low.min(authored);
+        self.high = self.high.max(authored);
+    }
+
+    pub(crate) fn hold(self, weight: f32) -> f32 {
+        weight.clamp(self.low, self.high)
+    }
 }
 
 /// A rig whose names are indices into one head.
@@ -170,26 +199,30 @@ impl BoundRig {
             add(&mut distributions, &effect.distributions, weight);
             scale += weight * effect.scale_change;
         }
-        for (sum, direct) in shapes.iter_mut().zip(&weights.shapes) {
-            *sum = (*sum + direct).clamp(0.0, 1.0);
+        let mut limits = vec![Limits::default(); self.shape_count];
+        for (limits, direct) in limits.iter_mut().zip(&weights.shapes) {
+            limits.include(*direct);
+        }
+        for ((sum, direct), limits) in shapes.iter_mut().zip(&weights.shapes).zip(&limits) {
+            *sum = limits.hold(*sum + direct);
         }
         for combination in &self.combinations {
-            let drivers = combination.drivers.iter().map(|d| shapes[*d as usize]);
+            let drivers = combination.drivers.iter().map(|d| shapes[*d as usize].clamp(0.0, 1.0));
             let weight = match combination.mode {
                 CombinationMode::Product => drivers.product(),
                 CombinationMode::Min => drivers.fold(1.0, f32::min),
             };
             for target in &combination.shapes {
                 let shape = &mut shapes[target.index as usize];
-                *shape = (*shape + weight * target.factor).clamp(0.0, 1.0);
+                *shape = limits[target.index as usize].hold(*shape + weight * target.factor);
             }
         }
         let driven = shapes.clone();
         for inbetweens in &self.inbetweens {
-            inbetweens.distribute(driven[inbetweens.shape as usize], &mut shapes);
+            inbetweens.distribute(driven[inbetweens.shape as usize], &mut shapes, &mut limits);
         }
-        for shape in &mut shapes {
-            *shape = shape.clamp(0.0, 1.0);
+        for (shape, limits) in shapes.iter_mut().zip(&limits) {
+            *shape = limits.hold(*shape);
         }
         for zone in &mut zones {
             *zone = zone.clamp(0.0, 1.0);
@@ -219,26 +252,26 @@ fn add(sums: &mut [f32], effects: &[(u32, f32)], weight: f32) {
 }
 
 impl Inbetweens {
-    /// Shares the weight of a shape between the two stops around it. The rest shape stands at 0, the shape at 1.
-    fn distribute(&self, weight: f32, shapes: &mut [f32]) {
+    /// Shares the weight of a shape between the two stops around it. The rest shape stands at 0, the shape at 1; outside
+    /// the first and the last segment go on.
+    fn distribute(&self, weight: f32, shapes: &mut [f32], limits: &mut [Limits]) {
         // Takes away what the shape got as its own, so that a target which is also driven directly keeps that.
         shapes[self.shape as usize] -= weight;
-        let above = self.stops.partition_point(|(at, _)| *at <= weight);
+        let beyond = !(0.0..=1.0).contains(&weight);
+        let mut give = |shape: u32, share: f32| {
+            shapes[shape as usize] += share;
+            if beyond {
+                limits[shape as usize].include(shapes[shape as usize]);
+            }
+        };
+        let above = self.stops.partition_point(|(at, _)| *at <= weight).min(self.stops.len() - 1);
+        let (high, high_shape) = self.stops[above];
         let (low, low_shape) =
             above.checked_sub(1).map_or((0.0, None), |i| (self.stops[i].0, Some(self.stops[i].1)));
-        match self.stops.get(above) {
-            Some((high, high_shape)) => {
-                let share = (weight - low) / (high - low);
-                shapes[*high_shape as usize] += share;
-                if let Some(low_shape) = low_shape {
-                    shapes[low_shape as usize] += 1.0 - share;
-                }
-            }
-            None => {
-                if let Some(last) = low_shape {
-                    shapes[last as usize] += 1.0;
-                }
-            }
+        let share = (weight - low) / (high - low);
+        give(high_shape, share);
+        if let Some(low_shape) = low_shape {
+            give(low_shape, 1.0 - share);
         }
     }
 }
@@ -280,7 +313,8 @@ impl<'a> Binder<'a> {
             }
             if self.noted.insert(("shape", name.to_owned())) {
                 let message = format!("the head has no shape {name:?}: it has no effect");
-                self.notes.push(Note { place: place(), message, nearest: None });
+                let subject = Some(name.to_owned());
+                self.notes.push(Note { place: place(), message, subject, nearest: None });
             }
         }
         Ok(targets)
@@ -340,7 +374,8 @@ impl<'a> Binder<'a> {
         };
         if self.noted.insert((kind, name.clone())) {
             let nearest = names::nearest(&name, resolver.names());
-            self.notes.push(Note { place: self.source.place_of_key(at), message, nearest });
+            let subject = Some(name).filter(|n| !n.is_empty());
+            self.notes.push(Note { place: self.source.place_of_key(at), message, subject, nearest });
         }
     }
 

@@ -53,8 +53,53 @@ pub struct Note {
     pub place: Place,
     /// What has no effect, and why.
     pub message: String,
+    /// The name in the message: notes that differ in nothing else are of one kind.
+    pub subject: Option<String>,
     /// The valid name that is most like the one found.
     pub nearest: Option<String>,
+}
+
+impl Note {
+    /// The message without the name that it is about.
+    fn kind(&self) -> String {
+        match &self.subject {
+            Some(subject) => self.message.replacen(&format!("{subject:?}"), "\0", 1),
+            None => self.message.clone(),
+        }
+    }
+}
+
+/// Most names in a message.
+const NAMES_SHOWN: usize = 8;
+
+/// Notes of one kind as one, in the order of the first of each: where that one is written, with the names of all.
+pub fn summed(notes: &[Note]) -> Vec<Note> {
+    let mut kinds: Vec<(String, Vec<&Note>)> = Vec::new();
+    let mut place_of: std::collections::HashMap<String, usize> = std::collections::HashMap::new();
+    for note in notes {
+        let kind = note.kind();
+        let place = *place_of.entry(kind.clone()).or_insert(kinds.len());
+        if place == kinds.len() {
+            kinds.push((kind, Vec::new()));
+        }
+        kinds[place].1.push(note);
+    }
+    let sum = |(kind, notes): (String, Vec<&Note>)| {
+        let mut names: Vec<String> =
+            notes.iter().filter_map(|n| n.subject.as_ref()).map(|s| format!("{s:?}")).collect();
+        let first = notes[0].clone();
+        if notes.len() == 1 || names.is_empty() {
+            return first;
+        }
+        if names.len() > NAMES_SHOWN {
+            let more = names.len() - NAMES_SHOWN;
+            names.truncate(NAMES_SHOWN);
+            names.push(format!("{more} more"));
+        }
+        let message = format!("{} ({} times)", kind.replacen('\0', &names.join(", "), 1), notes.len());
+        Note { message, subject: None, nearest: None, ..first }
+    };
+    kinds.into_iter().map(sum).collect()
 }
 
 impl std::fmt::Display for Note {

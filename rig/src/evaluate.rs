@@ -13,7 +13,7 @@
 
 use glam::{EulerRot, Quat, Vec3};
 
-use crate::bind::{Binder, BoundRig};
+use crate::bind::{Binder, BoundRig, Limits};
 use crate::error::{Note, RigError};
 use crate::expression::Rig;
 use crate::face_state::FaceState;
@@ -166,7 +166,8 @@ impl Evaluator {
         }
         if let Some(capture) = &sequence.capture {
             let message = format!("the recording {:?} was not loaded: it has no effect", capture.file);
-            notes.push(Note { place: source.place_of_key(&steps!["capture"]), message, nearest: None });
+            let place = source.place_of_key(&steps!["capture"]);
+            notes.push(Note { place, message, subject: None, nearest: None });
         }
         let tracks = [
             ("expressions", &sequence.expressions),
@@ -179,7 +180,7 @@ impl Evaluator {
                     let message =
                         format!("{name:?} has keys after the end of the sequence ({} s)", sequence.duration);
                     let place = source.place_of_key(&steps![field, name]);
-                    notes.push(Note { place, message, nearest: None });
+                    notes.push(Note { place, message, subject: Some(name.clone()), nearest: None });
                 }
             }
         }
@@ -241,10 +242,13 @@ impl Evaluator {
         for (index, track) in &self.states {
             weights.states[*index] = track.at(time_s);
         }
+        // Tracks pass as they are; where several add up they are held as far as the furthest of them goes.
+        let mut limits = vec![Limits::default(); weights.shapes.len()];
         for (targets, track) in &self.shapes {
             let weight = track.at(time_s);
             for target in targets {
                 weights.shapes[target.index as usize] += weight * target.factor;
+                limits[target.index as usize].include(weight * target.factor);
             }
         }
         let eyes = self.sequence.eyes.as_ref();
@@ -262,6 +266,9 @@ impl Evaluator {
             for target in targets {
                 weights.shapes[target.index as usize] += weight * target.factor;
             }
+        }
+        for (weight, limits) in weights.shapes.iter_mut().zip(&limits) {
+            *weight = limits.hold(*weight);
         }
         let head = &self.sequence.head;
         let sum = |track: &Track<f32>, more: f32| (track.at(time_s) + more).to_radians();

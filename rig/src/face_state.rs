@@ -8,7 +8,8 @@ use crate::life::CALM_PUPIL_MM;
 /// Weights of one moment, resolved against one head. Names are gone: everything is an index into the head.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaceState {
-    /// Weight of each of [`Head::shapes`], combinations and in-betweens included.
+    /// Weight of each of [`Head::shapes`], combinations and in-betweens included. 0 to 1, and beyond where a
+    /// track of a single shape goes there.
     pub shapes: Vec<f32>,
     /// Weight of each of `maps.zones`, 0 to 1: already summed over expressions and clamped (papers/004 section 8.2).
     pub zones: Vec<f32>,

@@ -56,7 +56,8 @@ pub struct Sequence {
     /// Weight of each state of the rig, 0 to 2.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub states: BTreeMap<String, Track<f32>>,
-    /// Weight of single shapes, added to what expressions do. `eyeBlink` moves both eyes.
+    /// Weight of single shapes, added to what expressions do. `eyeBlink` moves both eyes. Weights below 0 and above 1 are
+    /// used as they stand.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub shapes: BTreeMap<String, Track<f32>>,
     /// A recorded performance that adds tracks of shapes and of the head. Tracks written here win over recorded ones.

@@ -369,7 +369,8 @@ fn shapes_add_and_clamp() {
     weights.expressions = vec![1.0, 1.0];
     weights.shapes[2] = -1.0;
     let full = bound.face(&weights).shapes;
-    assert_eq!(full, [1.0, 0.25, 0.0]);
+    // The sum of expressions is held at 1; a track of a shape may go below 0.
+    assert_eq!(full, [1.0, 0.25, -0.75]);
 }
 
 #[test]
@@ -754,4 +755,54 @@ fn schemas_name_every_field_and_forbid_others() {
     for ease in Ease::ALL {
         assert!(eases.contains(&serde_json::to_string(&ease).unwrap()), "{ease:?}");
     }
+}
+
+#[test]
+fn tracks_of_shapes_pass_as_authored_and_sums_of_expressions_are_held() {
+    let head = head(&["jawOpen", "puff", "puff50"], &[], &[]);
+    let rig = rig(r#"{"expressions": {"open": {"shapes": {"jawOpen": 0.75}}},
+        "inbetweens": [{"shape": "puff", "target": "puff50", "weight": 0.5}]}"#);
+    let weights = |text: &str| {
+        let sequence = Sequence::from_json("s.json", text).unwrap();
+        Evaluator::new(&head, &rig, &sequence).unwrap().0.face_at(0.0).shapes
+    };
+    assert_eq!(weights(r#"{"fps": 30, "duration": 1, "shapes": {"jawOpen": 1.5}}"#)[0], 1.5);
+    assert_eq!(weights(r#"{"fps": 30, "duration": 1, "shapes": {"jawOpen": -0.5}}"#)[0], -0.5);
+    // What an expression adds does not lead beyond 1, nor beyond the track.
+    assert_eq!(
+        weights(r#"{"fps": 30, "duration": 1, "shapes": {"jawOpen": 0.5}, "expressions": {"open": 1}}"#)[0],
+        1.0
+    );
+    assert_eq!(
+        weights(r#"{"fps": 30, "duration": 1, "shapes": {"jawOpen": 1.5}, "expressions": {"open": 1}}"#)[0],
+        1.5
+    );
+    assert_eq!(
+        weights(r#"{"fps": 30, "duration": 1, "shapes": {"jawOpen": -0.5}, "expressions": {"open": 1}}"#)[0],
+        0.25
+    );
+    // Blinks of the living do not double a closed eye.
+    let eyes = self::head(&["eyeLookOutLeft"], &[], &[]);
+    let text = r#"{"fps": 30, "duration": 1, "shapes": {"eyeLookOutLeft": 0.9}, "eyes": {"yawDegrees": 30}}"#;
+    let sequence = Sequence::from_json("s.json", text).unwrap();
+    assert_eq!(Evaluator::new(&eyes, &self::rig("{}"), &sequence).unwrap().0.face_at(0.0).shapes[0], 1.0);
+    // Segments of in-betweens go on: 1.5 lies twice the way from puff50 to puff; -0.5 once the way back.
+    assert_eq!(weights(r#"{"fps": 30, "duration": 1, "shapes": {"puff": 1.5}}"#)[1..], [2.0, -1.0]);
+    assert_eq!(weights(r#"{"fps": 30, "duration": 1, "shapes": {"puff": -0.5}}"#)[1..], [0.0, -1.0]);
+}
+
+#[test]
+fn notes_of_one_kind_become_one() {
+    let rig = rig(r#"{"expressions": {"a": {"shapes": {"jawOpen": 1, "mouthPucker": 1, "cheekPuff": 1},
+        "wrinkles": {"brow": 1}}}}"#);
+    let (_, notes) = BoundRig::new(&head(&[], &[], &[]), &rig).unwrap();
+    assert_eq!(notes.len(), 4, "{notes:?}");
+    let summed = rubor_rig::error::summed(&notes);
+    assert_eq!(summed.len(), 2, "{summed:?}");
+    assert_eq!(
+        summed[0].message,
+        "the head has no shape \"cheekPuff\", \"jawOpen\", \"mouthPucker\": it has no effect (3 times)"
+    );
+    // One alone stays as it is.
+    assert_eq!(summed[1], notes[3]);
 }

@@ -17,7 +17,7 @@ pub mod visibility;
 use serde::Serialize;
 
 /// How bad it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// The file cannot be used as it is.
@@ -78,6 +78,23 @@ impl std::fmt::Display for Finding {
         }
         f.write_str(&self.message)
     }
+}
+
+/// Findings that differ only in their place as one, in the order of the first of each kind.
+pub fn summed(findings: Vec<Finding>) -> Vec<Finding> {
+    let mut kinds: Vec<(Finding, Vec<String>)> = Vec::new();
+    let mut place_of = std::collections::HashMap::new();
+    for finding in findings {
+        let kind = (finding.severity, finding.message.clone(), finding.fix.clone());
+        let place = *place_of.entry(kind).or_insert(kinds.len());
+        let at = finding.at.clone();
+        match kinds.get_mut(place) {
+            Some((_, places)) if !places.contains(&at) => places.push(at),
+            Some(_) => {}
+            None => kinds.push((finding, vec![at])),
+        }
+    }
+    kinds.into_iter().map(|(finding, places)| Finding { at: list(&places), ..finding }).collect()
 }
 
 /// Names in a message: all of a few, the first of many.

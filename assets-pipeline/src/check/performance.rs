@@ -1,7 +1,7 @@
 //! A rig or a sequence on a head.
 
 use rubor_rig::bind::BoundRig;
-use rubor_rig::error::{Note, RigError};
+use rubor_rig::error::{Note, RigError, summed};
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
@@ -38,7 +38,7 @@ pub fn check_rig(head: &Head, rig: &Rig) -> Vec<Finding> {
         Ok(bound) => bound,
         Err(e) => return vec![of_error(&e)],
     };
-    let mut findings: Vec<Finding> = notes.iter().map(of_note).collect();
+    let mut findings: Vec<Finding> = summed(&notes).iter().map(of_note).collect();
     let rest = bound.neutral_weights();
     let neutral = bound.face(&rest);
     for (i, name) in rig.expressions.keys().enumerate() {
@@ -80,7 +80,8 @@ pub fn check_sequence(head: &Head, rig: &Rig, sequence: &Sequence) -> (Vec<Findi
     };
     // What the rig alone has to say was said with the rig.
     let of_rig = BoundRig::new(head, rig).map(|(_, notes)| notes).unwrap_or_default();
-    let mut findings: Vec<Finding> = notes.iter().filter(|n| !of_rig.contains(n)).map(of_note).collect();
+    let of_sequence: Vec<Note> = notes.into_iter().filter(|n| !of_rig.contains(n)).collect();
+    let mut findings: Vec<Finding> = summed(&of_sequence).iter().map(of_note).collect();
     let end = sequence.duration;
     let head_tracks = [
         ("head.yawDegrees", &sequence.head.yaw_degrees),
@@ -96,11 +97,8 @@ pub fn check_sequence(head: &Head, rig: &Rig, sequence: &Sequence) -> (Vec<Findi
     for (name, track) in &sequence.shapes {
         let outside = values(track).filter(|v| !(0.0..=1.0).contains(v)).count();
         if outside > 0 {
-            let message = format!("{outside} keys leave 0 to 1: weights are cut to that range");
-            findings.push(
-                Finding::warning(format!("shape {name:?}"), message)
-                    .fix("split a shape that goes both ways into two, or scale the keys"),
-            );
+            let message = format!("{outside} keys leave 0 to 1: they are used as they stand");
+            findings.push(Finding::note(format!("shape {name:?}"), message));
         }
     }
     for (kind, tracks) in [("expression", &sequence.expressions), ("state", &sequence.states)] {

@@ -235,3 +235,13 @@ fn usd_layers_and_what_breaks_them() {
     }
     says(&texts(&usd::check(b"PXR-USDC\0", "".as_ref())), &["usdcat"]);
 }
+
+#[test]
+fn findings_that_differ_in_their_place_are_one() {
+    let shape = |i: usize| Finding::note(format!("shape {i}"), "it moves nothing");
+    let mut findings: Vec<Finding> = (0..28).map(shape).collect();
+    findings.push(Finding::warning("shape 0", "it moves nothing"));
+    let found = super::summed(findings);
+    assert_eq!(found.len(), 2);
+    assert!(found[0].at.ends_with("shape 7 and 20 more"), "{}", found[0].at);
+}

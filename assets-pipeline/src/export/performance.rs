@@ -103,7 +103,7 @@ pub fn top_shapes(
         strongest.fill(0.0);
         for frame in 0..evaluator.frame_count() {
             let FaceState { shapes, .. } = evaluator.face_at(evaluator.frame_time_s(frame));
-            strongest.iter_mut().zip(shapes).for_each(|(most, w)| *most = most.max(w));
+            strongest.iter_mut().zip(shapes).for_each(|(most, w)| *most = most.max(w.abs()));
         }
     }
     let path: Vec<f64> =

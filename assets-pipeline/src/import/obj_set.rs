@@ -1,9 +1,12 @@
-//! Heads from a folder of OBJ files: one neutral mesh and one mesh a shape, all with the same points in the same order.
+//! Heads from a folder of OBJ files: one neutral mesh and one mesh per shape, all with the same points.
 //!
 //! ```text
 //! neutral.obj --polygons--> PolyMesh --.
 //! NAME.obj ... --positions - neutral--> shapes --Catmull-Clark--> Head in metres
 //! ```
+//!
+//! Faces of a shape are compared with the neutral's: points in another order are matched by faces that correspond in
+//! order; a shape of another mesh is refused.
 //!
 //! The names of the files are the names of the shapes. ICT-FaceKit is the set that this was made for; its materials and
 //! its `vertex_indices.json` (68 landmarks of the iBUG scheme) are known by name.
@@ -19,10 +22,13 @@ use rubor_rig::landmarks::paired;
 
 use super::eye_projection::EyeProjection;
 use super::materials::guess_material;
-use super::obj::{GroupBy, read_polygons, read_positions};
+use super::obj::{self, GroupBy, ObjFile};
+use super::obj_match::{Match, compare};
 use super::tiles;
+use crate::check::list;
 use crate::convert::occlusion;
 use crate::error::ImportError;
+use crate::notes::{Note, Notes};
 use crate::poly::{PolyMesh, Shape, build_head};
 
 /// Offsets up to this part of the head's height are dropped: 0.007 mm on an adult head, below what a map texel spans.
@@ -105,11 +111,28 @@ impl std::str::FromStr for Units {
     }
 }
 
+/// A head and what there is to say about its files.
+#[derive(Clone, Debug)]
+pub struct ImportedSet {
+    /// The head, validated.
+    pub head: Head,
+    /// What was left out, guessed or repaired.
+    pub notes: Vec<Note>,
+}
+
+/// Reads the set without its notes; see [`read`].
+///
+/// # Errors
+/// As [`read`].
+pub fn import(options: &Options) -> Result<Head, ImportError> {
+    read(options).map(|set| set.head)
+}
+
 /// Reads the set.
 ///
 /// # Errors
-/// Unreadable folder or files, no neutral mesh, a shape with another number of points, broken lines.
-pub fn import(options: &Options) -> Result<Head, ImportError> {
+/// Unreadable folder or files, no neutral mesh, a shape with another number of points or other faces, broken lines.
+pub fn read(options: &Options) -> Result<ImportedSet, ImportError> {
     let folder = &options.folder;
     if options.subdivide > 2 {
         let found = options.subdivide.to_string();
@@ -117,21 +140,62 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
     }
     let files = obj_files(folder)?;
     let neutral = find_neutral(options, &files)?;
-    let mut mesh = read_polygons(&neutral, GroupBy::Material)?;
+    let mut notes = Notes::default();
+    let said = |notes: &mut Notes, file: &Path, of_file: &[Note]| {
+        for note in of_file {
+            let places = list(&note.places);
+            let place =
+                if places.is_empty() { file_name(file) } else { format!("{} ({places})", file_name(file)) };
+            notes.add(&note.message, place);
+        }
+    };
+    let ObjFile { mut mesh, notes: of_neutral } = obj::read(&neutral, GroupBy::Material)?;
+    said(&mut notes, &neutral, &of_neutral);
     let scale = options.units.metres();
     mesh.points.iter_mut().for_each(|p| *p *= scale);
 
     let shape_files: Vec<&PathBuf> = files.iter().filter(|f| **f != neutral).collect();
-    let read_shape = |path: &&PathBuf| -> Result<Shape, ImportError> {
-        let points = read_positions(path)?;
-        if points.len() != mesh.points.len() {
+    let read_shape = |path: &&PathBuf| -> Result<(Shape, Match, Vec<Note>), ImportError> {
+        let ObjFile { mesh: shape, notes } = obj::read_points(path, GroupBy::Material)?;
+        if shape.points.len() != mesh.points.len() {
+            let found = shape.points.len().to_string();
             let expected = format!("{} as in {}", mesh.points.len(), neutral.display());
-            return Err(ImportError::content(path, "positions", points.len().to_string(), expected));
+            return Err(ImportError::content(path, "positions", found, expected));
         }
-        let offsets = points.iter().zip(&mesh.points).map(|(p, rest)| *p * scale - *rest).collect();
-        Ok(Shape { name: file_stem(path), offsets })
+        let found = compare(&mesh, &shape);
+        let place = |p: usize| match &found {
+            Match::ByFaces(shape_of) => shape_of[p].map(|p| shape.points[p as usize]),
+            _ => Some(shape.points[p]),
+        };
+        let offset = |(p, rest): (usize, &Vec3)| place(p).map_or(Vec3::ZERO, |place| place * scale - *rest);
+        let offsets = mesh.points.iter().enumerate().map(offset).collect();
+        if let Match::Different(face) = found {
+            let corners: Vec<u32> = shape.face(face).iter().map(|c| c.point + 1).collect();
+            let found = format!("points {corners:?}, which are no face of {}", neutral.display());
+            let expected = "the faces of the neutral mesh: export both with the same order of vertices";
+            return Err(ImportError::content(path, format!("face {}", face + 1), found, expected));
+        }
+        Ok((Shape { name: file_stem(path), offsets }, found, notes))
     };
-    let mut shapes = shape_files.par_iter().map(read_shape).collect::<Result<Vec<Shape>, ImportError>>()?;
+    let read = shape_files.par_iter().map(read_shape).collect::<Result<Vec<_>, ImportError>>()?;
+    let mut shapes = Vec::with_capacity(read.len());
+    for ((shape, matched, of_file), path) in read.into_iter().zip(shape_files) {
+        match matched {
+            Match::ByFaces(_) => {
+                notes.add("points in another order than the neutral's are matched by faces", file_name(path));
+            }
+            Match::NoFaces => {
+                notes.add("shapes without faces are matched by the order of points alone", file_name(path));
+            }
+            Match::Order | Match::Different(_) => {}
+        }
+        // Groups and texture coordinates are those of the neutral file.
+        let about_points =
+            |n: &&Note| !n.message.contains("texture coordinates") && !n.message.contains("parts are");
+        let of_file: Vec<Note> = of_file.iter().filter(about_points).cloned().collect();
+        said(&mut notes, path, &of_file);
+        shapes.push(shape);
+    }
 
     split_lining(&mut mesh);
     let mut parts: Vec<(String, Material)> =
@@ -163,7 +227,7 @@ pub fn import(options: &Options) -> Result<Head, ImportError> {
         occlusion::bake_shapes(&mut head, options.occlusion_rays.div_ceil(2), &occlusion::SHAPES);
     }
     head.validate()?;
-    Ok(head)
+    Ok(ImportedSet { head, notes: notes.into_vec() })
 }
 
 fn file_stem(path: &Path) -> String {

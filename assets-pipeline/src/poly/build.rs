@@ -5,14 +5,13 @@ use std::collections::HashMap;
 use glam::Vec3;
 use rubor_rig::head::{BlendShape, Head, Material, Mesh, Part, Vertex};
 
-use super::{Corner, PolyMesh, Shape};
+use super::{Corner, PolyMesh, Shape, triangulate};
 
 /// Which group becomes which part: (group, name of the part, material), in the order of the parts.
 /// Groups with the same part name are merged; groups not named here are dropped.
 pub type HeadParts<'a> = &'a [(&'a str, &'a str, Material)];
 
-/// Triangulates the groups of `parts` (quads along the shorter diagonal), drops unused points and offsets not longer
-/// than `threshold`. Returns the head and the new index of each old point (`u32::MAX` when dropped).
+/// Triangulates the groups of `parts` by [`triangulate`], drops unused points and offsets not longer than `threshold`. Returns the head and the new index of each old point (`u32::MAX` when dropped).
 pub fn build_head(
     mesh: &PolyMesh,
     shapes: &[Shape],
@@ -21,15 +20,23 @@ pub fn build_head(
 ) -> (Head, Vec<u32>) {
     let mut new_point = vec![u32::MAX; mesh.points.len()];
     let mut out = Mesh::default();
-    for (i, (_, part_name, material)) in parts.iter().enumerate() {
-        if parts[..i].iter().any(|p| p.1 == *part_name) {
-            continue;
-        }
+    let mut faces_of_group: Vec<Vec<usize>> = vec![Vec::new(); mesh.groups.len()];
+    (0..mesh.face_count()).for_each(|f| faces_of_group[mesh.face_groups[f] as usize].push(f));
+    let group_index: HashMap<&str, usize> =
+        mesh.groups.iter().enumerate().map(|(i, g)| (&g[..], i)).collect();
+    let mut groups_of_part: HashMap<&str, Vec<usize>> = HashMap::new();
+    for (group, part, _) in parts {
+        let groups = groups_of_part.entry(part).or_default();
+        groups.extend(group_index.get(group).filter(|g| !groups.contains(g)));
+    }
+    for (_, part_name, material) in parts {
+        // The first mention of a part makes it.
+        let Some(groups) = groups_of_part.remove(part_name) else { continue };
         let start = out.triangles.len() as u32;
         let mut vertex_of: HashMap<(u32, u32), u32> = HashMap::new(); // parts share points, not vertices
-        let members: Vec<bool> =
-            mesh.groups.iter().map(|g| parts.iter().any(|p| p.0 == g && p.1 == *part_name)).collect();
-        for f in (0..mesh.face_count()).filter(|f| members[mesh.face_groups[*f] as usize]) {
+        let mut faces: Vec<usize> = groups.iter().flat_map(|g| &faces_of_group[*g]).copied().collect();
+        faces.sort_unstable();
+        for f in faces {
             let mut vertex = |c: Corner| {
                 let point = &mut new_point[c.point as usize];
                 if *point == u32::MAX {
@@ -42,14 +49,9 @@ pub fn build_head(
                 })
             };
             let face = mesh.face(f);
-            let at = |k: usize| mesh.points[face[k].point as usize];
-            let first = if face.len() == 4 && at(1).distance_squared(at(3)) < at(0).distance_squared(at(2)) {
-                1
-            } else {
-                0
-            };
-            let corners: Vec<u32> = (0..face.len()).map(|k| vertex(face[(k + first) % face.len()])).collect();
-            out.triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
+            let corners: Vec<u32> = face.iter().map(|c| vertex(*c)).collect();
+            let places: Vec<Vec3> = face.iter().map(|c| mesh.points[c.point as usize]).collect();
+            out.triangles.extend(triangulate(&places).iter().map(|t| t.map(|k| corners[k as usize])));
         }
         let end = out.triangles.len() as u32;
         if end > start {

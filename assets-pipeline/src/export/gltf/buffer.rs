@@ -3,6 +3,8 @@
 use glam::Vec3;
 use serde_json::{Value, json};
 
+use crate::error::ExportError;
+
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const BYTE: u32 = 5120;
@@ -153,7 +155,7 @@ impl Buffer {
     }
 
     /// Puts the lists into the document and returns the whole GLB.
-    pub(super) fn finish(mut self, mut document: Value) -> Vec<u8> {
+    pub(super) fn finish(mut self, mut document: Value) -> Result<Vec<u8>, ExportError> {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         document["buffers"] = json!([{"byteLength": self.bytes.len()}]);
         document["bufferViews"] = Value::Array(self.views);
@@ -161,19 +163,10 @@ impl Buffer {
         if !self.images.is_empty() {
             document["images"] = Value::Array(self.images);
         }
-        let mut text = document.to_string().into_bytes();
-        text.resize(text.len().next_multiple_of(4), b' ');
-        let mut glb = Vec::with_capacity(28 + text.len() + self.bytes.len());
-        let length = 12 + 8 + text.len() + 8 + self.bytes.len();
-        glb.extend_from_slice(b"glTF");
-        glb.extend_from_slice(&2_u32.to_le_bytes());
-        glb.extend_from_slice(&(length as u32).to_le_bytes());
-        for (kind, chunk) in [(b"JSON", &text), (b"BIN\0", &self.bytes)] {
-            glb.extend_from_slice(&(chunk.len() as u32).to_le_bytes());
-            glb.extend_from_slice(kind);
-            glb.extend_from_slice(chunk);
-        }
-        glb
+        let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
+        let json = document.to_string().into_bytes().into();
+        let glb = gltf::binary::Glb { header, json, bin: Some(self.bytes.into()) };
+        glb.to_vec().map_err(|e| ExportError::Encode { what: "GLB".into(), reason: e.to_string() })
     }
 }
 

@@ -202,7 +202,7 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
         }
         note_baked(rig, head, &mut notes);
     }
-    Ok(Exported { bytes: buffer.finish(document), notes, keys })
+    Ok(Exported { bytes: buffer.finish(document)?, notes, keys })
 }
 
 fn kept_shapes(head: &Head, options: &Options<'_>) -> Result<Vec<usize>, ExportError> {

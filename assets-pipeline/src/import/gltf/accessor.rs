@@ -91,7 +91,7 @@ fn check(
             format!("at most {MAX_COUNT}"),
         ));
     }
-    Ok(())
+    document.take(at, accessor.count() * components)
 }
 
 /// Byte slices of the elements of a view.

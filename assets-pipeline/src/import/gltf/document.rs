@@ -1,13 +1,35 @@
 //! A parsed document with its buffers in memory.
+//!
+//! The `gltf` crate reads meshes, nodes and skins; its checks run first, as its accessors panic on what they find. What it
+//! refuses though a face can be read without is taken out before: animations (read from the JSON, see `channels`),
+//! cameras, attributes of unknown names.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
+use base64::Engine;
+use base64::alphabet;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf_json::validation::{Checked, Error, Validate};
+use serde_json::Value;
 
 use crate::error::ImportError;
 use crate::facial_appearance::NAME;
+use crate::notes::Notes;
+
+/// Data URIs with or without padding.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
+
+/// Numbers that all accessors together may hold: a buffer may be named by many of them, an accessor without data claims
+/// any count. 800 shapes of 50 000 vertices are less.
+const MOST_NUMBERS: usize = 1 << 27;
 
 /// Extensions that change nothing about what is read here, or only how a number is stored.
 const UNDERSTOOD: [&str; 8] = [
@@ -26,25 +48,29 @@ const UNDERSTOOD_FAMILIES: [&str; 4] = ["KHR_materials_", "VRM", "KHR_xmp", "ADO
 /// Document, buffers, and the path for messages.
 pub(super) struct Document {
     pub(super) gltf: gltf::Document,
+    /// As it stands in the file: names of targets and animations are read from here.
+    pub(super) raw: Value,
     pub(super) buffers: Vec<Vec<u8>>,
     pub(super) path: PathBuf,
+    /// Of [`MOST_NUMBERS`].
+    numbers_left: Cell<usize>,
 }
 
 impl Document {
-    pub(super) fn load(bytes: &[u8], path: &Path) -> Result<Self, ImportError> {
-        check_glb_length(bytes, path)?;
-        let invalid = |e: gltf::Error| {
+    pub(super) fn load(bytes: &[u8], path: &Path, notes: &mut Notes) -> Result<Self, ImportError> {
+        let (text, mut blob) = chunks(bytes, path)?;
+        let invalid = |e: serde_json::Error| {
             ImportError::content(path, "document", e.to_string(), "a valid glTF 2.0 document")
         };
-        let parsed = gltf::Gltf::from_slice_without_validation(bytes).map_err(invalid)?;
-        let mut json = parsed.document.into_json();
+        let raw: Value = serde_json::from_slice(&text).map_err(invalid)?;
+        let mut json = serde_json::from_value(readable(&raw, notes)).map_err(invalid)?;
         check_extensions(&json, path)?;
         json.extensions_required.clear();
         check_positions(&json, path)?;
-        check_indices(&json, path)?;
-        let validated = gltf::Document::from_json_without_validation(json);
-        let mut document = Self { gltf: validated, buffers: Vec::new(), path: path.to_owned() };
-        let mut blob = parsed.blob;
+        check_indices(&json, path, notes)?;
+        let gltf = gltf::Document::from_json_without_validation(json);
+        let numbers_left = Cell::new(MOST_NUMBERS);
+        let mut document = Self { gltf, raw, buffers: Vec::new(), path: path.to_owned(), numbers_left };
         let mut buffers = Vec::new();
         for buffer in document.gltf.buffers() {
             let at = format!("buffer {}", buffer.index());
@@ -62,6 +88,21 @@ impl Document {
         }
         document.buffers = buffers;
         Ok(document)
+    }
+
+    /// Takes numbers from what all accessors may hold.
+    pub(super) fn take(&self, at: &str, numbers: usize) -> Result<(), ImportError> {
+        match self.numbers_left.get().checked_sub(numbers) {
+            Some(left) => {
+                self.numbers_left.set(left);
+                Ok(())
+            }
+            None => {
+                let found = format!("{numbers} numbers more");
+                let expected = format!("at most {MOST_NUMBERS} in all accessors that are read");
+                Err(self.fail(at, found, expected))
+            }
+        }
     }
 
     pub(super) fn fail(
@@ -108,9 +149,12 @@ impl Document {
             let Some((_, encoded)) = data.split_once(";base64,") else {
                 return Err(self.fail(at, "a data URI that is not base64", "base64 data"));
             };
-            return base64(encoded).ok_or_else(|| self.fail(at, "broken base64", "base64 data"));
+            return BASE64
+                .decode(encoded)
+                .map_err(|e| self.fail(at, format!("broken base64 ({e})"), "base64 data"));
         }
-        let relative = percent_decoded(uri).filter(|p| {
+        let decoded = percent_encoding::percent_decode_str(uri).decode_utf8().ok();
+        let relative = decoded.as_deref().filter(|p| {
             !uri.contains(':')
                 && !p.contains('\\')
                 && Path::new(p).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
@@ -139,20 +183,72 @@ impl Document {
     }
 }
 
-/// The header of a GLB states its length: a shorter file was cut off.
-fn check_glb_length(bytes: &[u8], path: &Path) -> Result<(), ImportError> {
+/// The JSON and the binary chunk of a GLB; a file without its header is JSON alone.
+fn chunks<'a>(bytes: &'a [u8], path: &Path) -> Result<(Cow<'a, [u8]>, Option<Vec<u8>>), ImportError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok(());
+        return Ok((Cow::Borrowed(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)), None));
     }
+    // `gltf::binary` subtracts the length of the header without a check.
     let stated = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     match stated {
-        Some(length) if length as usize <= bytes.len() && length >= 20 => Ok(()),
+        Some(length) if length as usize <= bytes.len() && length >= 20 => {}
         _ => {
             let expected =
                 stated.map_or("a header of 12 bytes".into(), |l| format!("{l} bytes as its header states"));
-            Err(ImportError::content(path, "GLB header", format!("{} bytes", bytes.len()), expected))
+            return Err(ImportError::content(path, "GLB header", format!("{} bytes", bytes.len()), expected));
         }
     }
+    let glb = gltf::binary::Glb::from_slice(bytes)
+        .map_err(|e| ImportError::content(path, "GLB", e.to_string(), "a GLB file of version 2"))?;
+    if glb.header.version != 2 {
+        let found = format!("version {}", glb.header.version);
+        return Err(ImportError::content(path, "GLB header", found, "version 2"));
+    }
+    // Some writers fill up the chunk with zeros in place of spaces.
+    let json = match glb.json {
+        Cow::Borrowed(json) => Cow::Borrowed(json.trim_ascii_end().strip_suffix(b"\0").map_or(json, |_| {
+            let end = json.iter().rposition(|b| *b != 0 && !b.is_ascii_whitespace()).map_or(0, |i| i + 1);
+            &json[..end]
+        })),
+        owned => owned,
+    };
+    Ok((json, glb.bin.map(Cow::into_owned)))
+}
+
+/// The document without what the `gltf` crate refuses and no face needs.
+fn readable(raw: &Value, notes: &mut Notes) -> Value {
+    let mut json = raw.clone();
+    if let Some(root) = json.as_object_mut() {
+        root.remove("animations");
+        root.remove("cameras");
+    }
+    for node in json.get_mut("nodes").and_then(Value::as_array_mut).into_iter().flatten() {
+        node.as_object_mut().map(|node| node.remove("camera"));
+    }
+    for (m, mesh) in json.get_mut("meshes").and_then(Value::as_array_mut).into_iter().flatten().enumerate() {
+        let primitives = mesh.get_mut("primitives").and_then(Value::as_array_mut);
+        for (p, primitive) in primitives.into_iter().flatten().enumerate() {
+            let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) else {
+                continue;
+            };
+            attributes.retain(|name, _| {
+                let known = is_attribute(name);
+                if !known {
+                    let message = "attributes that glTF 2.0 does not know are left out";
+                    notes.add(message, format!("{name:?} of mesh {m}, primitive {p}"));
+                }
+                known
+            });
+        }
+    }
+    json
+}
+
+fn is_attribute(name: &str) -> bool {
+    let numbered = |prefix: &str| name.strip_prefix(prefix).is_some_and(|n| n.parse::<u32>().is_ok());
+    matches!(name, "POSITION" | "NORMAL" | "TANGENT")
+        || name.starts_with('_')
+        || ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"].into_iter().any(numbered)
 }
 
 /// What a file requires must be understood; compressed geometry is refused in words.
@@ -178,15 +274,22 @@ fn check_extensions(json: &gltf_json::Root, path: &Path) -> Result<(), ImportErr
     Ok(())
 }
 
-/// The checks of the `gltf` crate, without which it panics, but for one: accessors without data are zeros in glTF 2.0,
-/// the crate refuses them.
-fn check_indices(json: &gltf_json::Root, path: &Path) -> Result<(), ImportError> {
+/// Lists in which a fault changes nothing that is read here: parts take the name of their material, own maps come from
+/// images, which are checked where they are read.
+const UNREAD: [&str; 4] = ["materials", "textures", "samplers", "images"];
+
+/// The checks of the `gltf` crate, without which it panics. Two faults are none here: accessors without data are zeros in
+/// glTF 2.0; bounds of positions are not used.
+fn check_indices(json: &gltf_json::Root, path: &Path, notes: &mut Notes) -> Result<(), ImportError> {
     let mut fault: Option<(String, Error)> = None;
     json.validate(json, gltf_json::Path::new, &mut |place, error| {
         let place = place().to_string();
         let zeros =
             error == Error::Missing && place.starts_with("accessors") && place.ends_with("bufferView");
-        if !zeros && fault.is_none() {
+        let bounds = place.ends_with(".min") || place.ends_with(".max");
+        if UNREAD.iter().any(|list| place.starts_with(list)) {
+            notes.add("faults of materials, textures and images are passed over", place);
+        } else if !zeros && !bounds && fault.is_none() {
             fault = Some((place, error));
         }
     });
@@ -227,53 +330,16 @@ fn check_positions(json: &gltf_json::Root, path: &Path) -> Result<(), ImportErro
     Ok(())
 }
 
-fn percent_decoded(uri: &str) -> Option<String> {
-    let mut out = Vec::with_capacity(uri.len());
-    let mut bytes = uri.bytes();
-    while let Some(b) = bytes.next() {
-        if b == b'%' {
-            let digits = [bytes.next()?, bytes.next()?];
-            out.push(u8::from_str_radix(std::str::from_utf8(&digits).ok()?, 16).ok()?);
-        } else {
-            out.push(b);
-        }
-    }
-    String::from_utf8(out).ok()
-}
-
-/// RFC 4648, padding optional.
-fn base64(text: &str) -> Option<Vec<u8>> {
-    let mut out = Vec::with_capacity(text.len() / 4 * 3);
-    let (mut bits, mut count) = (0_u32, 0);
-    for b in text.trim_end_matches('=').bytes() {
-        let value = match b {
-            b'A'..=b'Z' => b - b'A',
-            b'a'..=b'z' => b - b'a' + 26,
-            b'0'..=b'9' => b - b'0' + 52,
-            b'+' => 62,
-            b'/' => 63,
-            _ => return None,
-        };
-        bits = bits << 6 | u32::from(value);
-        count += 6;
-        if count >= 8 {
-            count -= 8;
-            out.push((bits >> count) as u8);
-        }
-    }
-    Some(out)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn base64_and_percent_follow_their_standards() {
-        assert_eq!(base64("Zm9vYmE=").as_deref(), Some(&b"fooba"[..]));
-        assert_eq!(base64("Zm9vYg==").as_deref(), Some(&b"foob"[..]));
-        assert_eq!(base64("Zm9v!"), None);
-        assert_eq!(percent_decoded("a%20b").as_deref(), Some("a b"));
-        assert_eq!(percent_decoded("a%2"), None);
+    fn base64_follows_its_standard() {
+        for (text, bytes) in [("Zm9vYmE=", Some(&b"fooba"[..])), ("Zm9vYg==", Some(b"foob")), ("Zm9v!", None)]
+        {
+            assert_eq!(BASE64.decode(text).ok().as_deref(), bytes, "{text}");
+            assert_eq!(BASE64.decode(text.trim_end_matches('=')).ok().as_deref(), bytes, "{text}");
+        }
     }
 }

@@ -1,27 +1,30 @@
-//! Files of other programs: every mesh of the scene, its morph targets by name.
+//! Files of other programs: every mesh of the scene, its morph targets as shapes.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Mat3, Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
 use gltf::{Mesh, Node, Semantic};
 use rubor_rig::head::{BlendShape, Head, Part, Vertex};
 
 use super::accessor;
 use super::document::Document;
+use super::motion::{Driver, Motion};
 use super::placement::Placement;
+use super::shapes::Shapes;
+use super::weld::{Corner, weld};
 use crate::error::ImportError;
 use crate::import::materials::guess_material;
+use crate::notes::Notes;
 
-/// A vertex as far as welding is concerned: bits of position, normal and every offset that is not zero.
-type WeldKey = Vec<u32>;
-
-#[derive(Default)]
-struct Builder {
+struct Builder<'a> {
+    document: &'a Document,
+    motion: &'a Motion,
+    notes: &'a mut Notes,
     head: Head,
-    /// Shape names in order of first use, and offsets by point.
-    shapes: Vec<(String, BTreeMap<u32, Vec3>)>,
-    points: HashMap<WeldKey, u32>,
+    shapes: Shapes,
+    /// Of each vertex of the head; points come when all are known.
+    corners: Vec<Corner>,
     /// World transform of every node of the scene.
     world: HashMap<usize, Mat4>,
 }
@@ -29,102 +32,86 @@ struct Builder {
 /// A tree of nodes is not deeper than this.
 const MOST_LEVELS: usize = 512;
 
-pub(super) fn read(document: &Document) -> Result<Head, ImportError> {
-    let mut builder = Builder::default();
+/// The head, and what moves each of its shapes.
+pub(super) fn read(
+    document: &Document,
+    motion: &Motion,
+    notes: &mut Notes,
+) -> Result<(Head, Vec<(String, Driver)>), ImportError> {
+    let shapes = Shapes::new(document, notes);
+    let (head, corners, world) = (Head::default(), Vec::new(), HashMap::new());
+    let mut builder = Builder { document, motion, notes, head, shapes, corners, world };
     let scene = document.gltf.default_scene().or_else(|| document.gltf.scenes().next());
     match scene {
         Some(scene) => {
             builder.head.name = scene.name().unwrap_or_default().to_owned();
             for node in scene.nodes() {
-                builder.node(document, &node, Mat4::IDENTITY, 0)?;
+                builder.node(&node, Mat4::IDENTITY, 0)?;
             }
-            builder.meshes(document, scene.nodes())?;
+            builder.meshes(scene.nodes())?;
+            let left_out = document.gltf.nodes().filter(|n| n.mesh().is_some());
+            for node in left_out.filter(|n| !builder.world.contains_key(&n.index())) {
+                builder.notes.add("meshes outside the scene are left out", format!("node {}", node.index()));
+            }
         }
         None => {
             for mesh in document.gltf.meshes() {
-                builder.mesh(document, &mesh, &Placement::Rigid(Mat4::IDENTITY))?;
+                let node =
+                    document.gltf.nodes().find(|n| n.mesh().is_some_and(|m| m.index() == mesh.index()));
+                let node = node.map(|n| n.index());
+                builder.mesh(&mesh, node, &Placement::Rigid(Mat4::IDENTITY))?;
             }
         }
     }
-    let mut head = builder.head;
+    let (mut head, shapes) = builder.finish();
     if head.mesh.triangles.is_empty() {
         return Err(document.fail("scene", "no triangles", "a mesh"));
     }
     if head.name.is_empty() {
         head.name = document.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     }
-    head.shapes = (builder.shapes.into_iter())
-        .map(|(name, moved)| {
-            let (points, offsets) = moved.into_iter().unzip();
-            BlendShape { name, points, offsets, ..BlendShape::default() }
-        })
-        .collect();
-    Ok(head)
+    Ok((head, shapes))
 }
 
-/// Names of the morph targets: `extras.targetNames`, else `target 0` and so on.
-pub(super) fn target_names(mesh: &Mesh<'_>) -> Vec<String> {
-    let count = mesh.primitives().map(|p| p.morph_targets().count()).max().unwrap_or(0);
-    let extras: Option<serde_json::Value> =
-        mesh.extras().as_ref().and_then(|e| serde_json::from_str(e.get()).ok());
-    let name = |i: usize| {
-        let given = extras.as_ref().and_then(|e| e["targetNames"][i].as_str());
-        given.map_or_else(|| format!("target {i}"), str::to_owned)
-    };
-    (0..count).map(name).collect()
-}
-
-impl Builder {
+impl Builder<'_> {
     /// Transforms of a node and all below it.
-    fn node(
-        &mut self,
-        document: &Document,
-        node: &Node<'_>,
-        parent: Mat4,
-        level: usize,
-    ) -> Result<(), ImportError> {
+    fn node(&mut self, node: &Node<'_>, parent: Mat4, level: usize) -> Result<(), ImportError> {
         let at = format!("node {}", node.index());
         if self.world.contains_key(&node.index()) {
-            return Err(document.fail(&at, "more than one way to it", "a tree of nodes"));
+            return Err(self.document.fail(&at, "more than one way to it", "a tree of nodes"));
         }
         if level >= MOST_LEVELS {
-            return Err(document.fail(
-                &at,
-                "a deeper tree",
-                format!("at most {MOST_LEVELS} levels of nodes"),
-            ));
+            let expected = format!("at most {MOST_LEVELS} levels of nodes");
+            return Err(self.document.fail(&at, "a deeper tree", expected));
         }
         let world_from_node = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
         if !world_from_node.is_finite() {
-            return Err(document.fail(&at, "a transform that is not finite", "finite numbers"));
+            return Err(self.document.fail(&at, "a transform that is not finite", "finite numbers"));
         }
         self.world.insert(node.index(), world_from_node);
-        node.children().try_for_each(|child| self.node(document, &child, world_from_node, level + 1))
+        node.children().try_for_each(|child| self.node(&child, world_from_node, level + 1))
     }
 
     /// Meshes of nodes, depth first; joints may stand anywhere, so all transforms are known before.
-    fn meshes<'a>(
-        &mut self,
-        document: &Document,
-        nodes: impl Iterator<Item = Node<'a>>,
-    ) -> Result<(), ImportError> {
+    fn meshes<'n>(&mut self, nodes: impl Iterator<Item = Node<'n>>) -> Result<(), ImportError> {
         for node in nodes {
             if let Some(mesh) = node.mesh() {
-                let placement = Placement::of(document, &node, &self.world)?;
-                self.mesh(document, &mesh, &placement)?;
+                let placement = Placement::of(self.document, &node, &self.world)?;
+                self.mesh(&mesh, Some(node.index()), &placement)?;
             }
-            self.meshes(document, node.children())?;
+            self.meshes(node.children())?;
         }
         Ok(())
     }
 
     fn mesh(
         &mut self,
-        document: &Document,
         mesh: &Mesh<'_>,
+        node: Option<usize>,
         placement: &Placement,
     ) -> Result<(), ImportError> {
-        let names = target_names(mesh);
+        let document = self.document;
+        let slots = self.shapes.of_instance(document, mesh, node, self.motion, self.notes);
         for (i, primitive) in mesh.primitives().enumerate() {
             let at = |what: &str| format!("mesh {}, primitive {i}, {what}", mesh.index());
             let positions = primitive
@@ -145,42 +132,67 @@ impl Builder {
             check("NORMAL", normals.len())?;
             let uvs = match primitive.get(&Semantic::TexCoords(0)) {
                 Some(a) => accessor::floats::<2>(document, &at("TEXCOORD_0"), &a)?,
-                None => vec![[0.0; 2]; count],
+                None => {
+                    self.notes.add("parts without texture coordinates have them all at 0", at("TEXCOORD_0"));
+                    vec![[0.0; 2]; count]
+                }
             };
             check("TEXCOORD_0", uvs.len())?;
-            let mut targets = Vec::new();
+            let mut targets: Vec<(u32, Vec<[f32; 3]>)> = Vec::new();
             for (t, target) in primitive.morph_targets().enumerate() {
-                let what = format!("target {t}");
-                let offsets = match target.positions() {
-                    Some(a) => accessor::floats::<3>(document, &at(&what), &a)?,
-                    None => vec![[0.0; 3]; count],
+                // Nothing moves where an accessor has no data.
+                let Some(a) = target.positions().filter(|a| a.view().is_some() || a.sparse().is_some())
+                else {
+                    continue;
                 };
+                let what = format!("target {t}");
+                let offsets = accessor::floats::<3>(document, &at(&what), &a)?;
                 check(&what, offsets.len())?;
-                targets.push(offsets);
+                targets.push((slots[t], offsets));
             }
+            // As the points of a welded vertex are compared.
+            targets.sort_by_key(|(slot, _)| *slot);
             let indices = match primitive.indices() {
                 Some(a) => accessor::integers(document, &at("indices"), &a)?,
                 None => (0..count as u32).collect(),
             };
             if let Some(v) = indices.iter().find(|v| **v as usize >= count) {
-                return Err(document.fail(
-                    &at("indices"),
-                    format!("vertex {v}"),
-                    format!("one below {count}"),
-                ));
+                let expected = format!("one below {count}");
+                return Err(document.fail(&at("indices"), format!("vertex {v}"), expected));
             }
             let Some(mut triangles) = triangles(&indices, primitive.mode()) else {
-                continue; // points and lines are no surface
+                self.notes.add("points and lines are no surface and are left out", at("mode"));
+                continue;
             };
+            if primitive.mode() == Mode::Triangles && indices.len() % 3 != 0 {
+                let rest = format!("{} indices", indices.len());
+                self.notes.add("indices after the last whole triangle are left out", at(&rest));
+            }
             let worlds = placement.of_vertices(document, &at(""), &primitive, count)?;
             if worlds.at(0).determinant() < 0.0 {
                 triangles.iter_mut().for_each(|t| t.swap(1, 2));
             }
-            let first = self.head.mesh.vertices.len() as u32;
-            let slots: Vec<usize> = names.iter().map(|n| self.shape_slot(n)).collect();
+            let first = self.corners.len() as u32;
             for v in 0..count {
-                let point = self.weld(worlds.at(v), positions[v], normals[v], &slots, &targets, v);
-                self.head.mesh.vertices.push(Vertex { point, uv: Vec2::from_array(uvs[v]) });
+                let world = worlds.at(v);
+                let position = world.transform_point3(Vec3::from_array(positions[v]));
+                // Normals stay at right angles to a surface that is scaled unevenly.
+                let normal = Mat3::from_mat4(world).inverse().transpose() * Vec3::from_array(normals[v]);
+                let mut moved: Vec<(u32, Vec3)> = Vec::new();
+                for (slot, offsets) in &targets {
+                    if offsets[v] != [0.0; 3] {
+                        moved.push((*slot, world.transform_vector3(Vec3::from_array(offsets[v]))));
+                    }
+                }
+                if !position.is_finite() || moved.iter().any(|(_, o)| !o.is_finite()) {
+                    return Err(document.fail(
+                        &at("POSITION"),
+                        format!("vertex {v} out of range"),
+                        "finite places",
+                    ));
+                }
+                self.corners.push(Corner { position, normal: normal.normalize_or_zero(), moved });
+                self.head.mesh.vertices.push(Vertex { point: 0, uv: Vec2::from_array(uvs[v]) });
             }
             let start = self.head.mesh.triangles.len() as u32;
             self.head.mesh.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
@@ -193,49 +205,25 @@ impl Builder {
         Ok(())
     }
 
-    fn shape_slot(&mut self, name: &str) -> usize {
-        match self.shapes.iter().position(|(n, _)| n == name) {
-            Some(i) => i,
-            None => {
-                self.shapes.push((name.to_owned(), BTreeMap::new()));
-                self.shapes.len() - 1
+    /// Points from vertices, offsets of shapes by point.
+    fn finish(self) -> (Head, Vec<(String, Driver)>) {
+        let (mut head, shapes) = (self.head, self.shapes.finish());
+        let (point_of, first_of) = weld(&self.corners);
+        head.mesh.vertices.iter_mut().zip(point_of).for_each(|(vertex, point)| vertex.point = point);
+        head.shapes = shapes
+            .iter()
+            .map(|(name, _)| BlendShape { name: name.clone(), ..BlendShape::default() })
+            .collect();
+        for (point, vertex) in first_of.into_iter().enumerate() {
+            let corner = &self.corners[vertex];
+            head.mesh.points.push(corner.position);
+            for (slot, offset) in &corner.moved {
+                let shape = &mut head.shapes[*slot as usize];
+                shape.points.push(point as u32);
+                shape.offsets.push(*offset);
             }
         }
-    }
-
-    /// The point of a vertex: an old one if position, normal and all offsets are the same bit for bit, so that texture
-    /// seams close and edges that are meant to be sharp stay.
-    fn weld(
-        &mut self,
-        world: Mat4,
-        position: [f32; 3],
-        normal: [f32; 3],
-        slots: &[usize],
-        targets: &[Vec<[f32; 3]>],
-        v: usize,
-    ) -> u32 {
-        let position = world.transform_point3(Vec3::from_array(position));
-        let normal = world.transform_vector3(Vec3::from_array(normal));
-        let mut key: WeldKey =
-            position.to_array().iter().chain(&normal.to_array()).map(|c| c.to_bits()).collect();
-        let mut moved = Vec::new();
-        for (slot, offsets) in slots.iter().zip(targets) {
-            if offsets[v] != [0.0; 3] {
-                let offset = world.transform_vector3(Vec3::from_array(offsets[v]));
-                key.push(*slot as u32);
-                key.extend(offset.to_array().map(f32::to_bits));
-                moved.push((*slot, offset));
-            }
-        }
-        let next = self.head.mesh.points.len() as u32;
-        let point = *self.points.entry(key).or_insert(next);
-        if point == next {
-            self.head.mesh.points.push(position);
-            for (slot, offset) in moved {
-                self.shapes[slot].1.insert(point, offset);
-            }
-        }
-        point
+        (head, shapes)
     }
 }
 

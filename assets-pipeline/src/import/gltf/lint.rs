@@ -7,11 +7,13 @@ use glam::{Vec3, Vec4};
 use gltf::Semantic;
 
 use super::accessor::floats;
+use super::channels::{Channel, Target, of_animation};
 use super::document::Document;
-use super::foreign::target_names;
+use super::names::of_mesh;
 use crate::check::{Finding, list};
 use crate::error::ImportError;
 use crate::facial_appearance::NAME;
+use crate::notes::Notes;
 
 /// Lengths of normals and sums of joint weights may be off by this: bytes and shorts round.
 const ROUNDING: f32 = 0.01;
@@ -21,28 +23,30 @@ const ROUNDING: f32 = 0.01;
 /// # Errors
 /// A document or an accessor that cannot be read at all.
 pub fn lint(bytes: &[u8], path: &Path) -> Result<Vec<Finding>, ImportError> {
-    let document = Document::load(bytes, path)?;
+    let mut notes = Notes::default();
+    let document = Document::load(bytes, path, &mut notes)?;
     let mut findings = Vec::new();
     if document.gltf.extension_value(NAME).is_none() {
         let message = format!("there is no {NAME}: maps, rig and landmarks are not in this file");
         findings.push(Finding::note("", message).fix("`rubor import` adds them"));
     }
     for mesh in document.gltf.meshes() {
-        names(&mesh, &mut findings);
+        names(&document, &mesh, &mut findings);
         for primitive in mesh.primitives() {
             let at = format!("mesh {}, primitive {}", mesh.index(), primitive.index());
             attributes(&document, &at, &primitive, &mut findings)?;
         }
     }
-    animations(&document, &mut findings)?;
+    animations(&document, &mut findings, &mut notes);
     if document.gltf.skins().len() > 0 {
         let message = "joints are read in their rest pose: their animation moves nothing here";
         findings.push(Finding::note("skins", message).fix("bake jaw and eye joints into morph targets"));
     }
+    findings.extend(notes.into_vec().iter().map(Finding::from));
     Ok(findings)
 }
 
-fn names(mesh: &gltf::Mesh<'_>, findings: &mut Vec<Finding>) {
+fn names(document: &Document, mesh: &gltf::Mesh<'_>, findings: &mut Vec<Finding>) {
     let at = format!("mesh {}", mesh.index());
     let count = mesh.primitives().map(|p| p.morph_targets().count()).max().unwrap_or(0);
     if count == 0 {
@@ -52,17 +56,15 @@ fn names(mesh: &gltf::Mesh<'_>, findings: &mut Vec<Finding>) {
         let message = "its primitives have different numbers of morph targets";
         findings.push(Finding::error(at.clone(), message).fix("export all parts with the same targets"));
     }
-    let names = target_names(mesh);
-    let unnamed: Vec<&String> = names.iter().filter(|n| n.starts_with("target ")).collect();
-    if !unnamed.is_empty() {
-        let message = format!(
-            "{} of {count} morph targets have no name: nothing can drive them by name",
-            unnamed.len()
-        );
+    let (names, _) = of_mesh(document, mesh);
+    let unnamed = names.iter().filter(|n| !n.given).count();
+    if unnamed > 0 {
+        let message =
+            format!("{unnamed} of {count} morph targets have no name: nothing can drive them by name");
         findings.push(Finding::warning(at.clone(), message).fix("write them to mesh.extras.targetNames"));
     }
     let mut seen = HashSet::new();
-    let twice: Vec<&String> = names.iter().filter(|n| !seen.insert(*n)).collect();
+    let twice: Vec<&str> = names.iter().map(|n| &n.text[..]).filter(|n| !seen.insert(*n)).collect();
     if !twice.is_empty() {
         findings.push(
             Finding::warning(at, format!("morph targets share a name: {}", list(&twice))).fix("rename them"),
@@ -133,41 +135,26 @@ fn attributes(
     Ok(())
 }
 
-fn animations(document: &Document, findings: &mut Vec<Finding>) -> Result<(), ImportError> {
-    for animation in document.gltf.animations() {
-        for (i, channel) in animation.channels().enumerate() {
-            let at = format!("animation {}, channel {i}", animation.index());
-            let times = floats::<1>(document, &at, &channel.sampler().input())?;
-            if times.windows(2).any(|w| w[0][0] >= w[1][0]) {
-                findings.push(
-                    Finding::error(at.clone(), "times of keys do not rise").fix("sort the keys, one a time"),
-                );
-            }
-            if channel.target().property() != gltf::animation::Property::MorphTargetWeights {
-                continue;
-            }
-            let count = channel.target().node().mesh().map_or(0, |m| target_names(&m).len());
-            let values = floats::<1>(document, &at, &channel.sampler().output())?;
-            let cubic = channel.sampler().interpolation() == gltf::animation::Interpolation::CubicSpline;
-            let expected = times.len() * count * if cubic { 3 } else { 1 };
-            if values.len() != expected {
-                let message = format!(
-                    "there are {} weights, {} keys of {count} targets need {expected}",
-                    values.len(),
-                    times.len()
-                );
-                findings.push(Finding::error(at, message).fix("export the animation again"));
-                continue;
-            }
-            let outside = (values.iter().enumerate())
-                .filter(|(i, _)| !cubic || (i / count.max(1)) % 3 == 1)
-                .filter(|(_, v)| !(-0.001..=1.001).contains(&v[0]))
-                .count();
-            if outside > 0 {
-                let message = format!("{outside} weights leave 0 to 1: sequences cut them there");
-                findings.push(Finding::warning(at, message));
+fn animations(document: &Document, findings: &mut Vec<Finding>, notes: &mut Notes) {
+    let count = document.raw["animations"].as_array().map_or(0, Vec::len);
+    for animation in 0..count {
+        for named in of_animation(document, animation, notes) {
+            let width = match named.target {
+                Target::Weights => {
+                    let mesh = document.gltf.nodes().nth(named.node).and_then(|n| n.mesh());
+                    mesh.map_or(0, |m| of_mesh(document, &m).0.len())
+                }
+                Target::Rotation => 4,
+                Target::Translation | Target::Scale => 3,
+            };
+            let Some(channel) = Channel::read(document, &named, width, notes) else { continue };
+            if named.target == Target::Weights {
+                let outside = channel.values().filter(|v| !(-0.001..=1.001).contains(v)).count();
+                if outside > 0 {
+                    let message = format!("{outside} weights leave 0 to 1: they are used as they stand");
+                    findings.push(Finding::note(named.at, message));
+                }
             }
         }
     }
-    Ok(())
 }

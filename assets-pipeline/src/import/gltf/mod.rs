@@ -3,18 +3,24 @@
 //! ```text
 //! .glb or .gltf + buffers --document--> accessors --> primitives of every mesh node
 //!   own file (RUBOR_facial_appearance): points, parts, maps as stored
-//!   foreign file: node transforms applied, shapes united by name, points welded, materials guessed from names
+//!   foreign file: node transforms applied, shapes united where names and weights agree, points welded by distance and
+//!                 angle, materials guessed from names
+//! first animation --channels--> tracks by node; default weights where nothing is keyed
 //! ```
 //!
 //! Nothing in a file is trusted: every range is checked before it is read.
 
 mod accessor;
+mod channels;
 mod document;
 mod foreign;
 mod lint;
 mod motion;
+mod names;
 mod own;
 mod placement;
+mod shapes;
+mod weld;
 
 use std::fs;
 use std::path::Path;
@@ -24,8 +30,10 @@ use rubor_rig::timeline::Sequence;
 
 use self::document::Document;
 pub use self::lint::lint;
+use self::motion::Motion;
 use crate::error::ImportError;
 use crate::facial_appearance::NAME;
+use crate::notes::{Note, Notes};
 
 /// A head and what its file holds beside it.
 #[derive(Clone, Debug, Default)]
@@ -36,8 +44,11 @@ pub struct ImportedHead {
     pub rig: Option<serde_json::Value>,
     /// The sequence file that its animation was made from.
     pub sequence: Option<serde_json::Value>,
-    /// Its first animation as tracks: what other programs keyed.
+    /// Its first animation that moves the head, as tracks: what other programs keyed. Default weights of meshes and nodes
+    /// are constant tracks, also without an animation.
     pub animation: Option<Sequence>,
+    /// What was left out, guessed or repaired.
+    pub notes: Vec<Note>,
 }
 
 /// Reads a `.glb` or `.gltf`. Buffers and images may be in the file, in data URIs, or in files of the same folder or
@@ -55,12 +66,18 @@ pub fn read(path: &Path) -> Result<ImportedHead, ImportError> {
 /// # Errors
 /// As [`read`].
 pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError> {
-    let document = Document::load(bytes, path)?;
-    let mut imported = match document.gltf.extension_value(NAME) {
-        Some(extension) => own::read(&document, extension)?,
-        None => ImportedHead { head: foreign::read(&document)?, ..ImportedHead::default() },
+    let mut notes = Notes::default();
+    let document = Document::load(bytes, path, &mut notes)?;
+    let motion = Motion::read(&document, &mut notes);
+    let (mut imported, shapes) = match document.gltf.extension_value(NAME) {
+        Some(extension) => own::read(&document, extension, &motion)?,
+        None => {
+            let (head, shapes) = foreign::read(&document, &motion, &mut notes)?;
+            (ImportedHead { head, ..ImportedHead::default() }, shapes)
+        }
     };
     imported.head.validate()?;
-    imported.animation = motion::read(&document)?;
+    imported.animation = motion.sequence(&document, shapes, &mut notes);
+    imported.notes = notes.into_vec();
     Ok(imported)
 }

@@ -1,274 +1,270 @@
-//! The first animation of a document as tracks of a sequence.
+//! The first animation of a document that moves the head, and default weights, as tracks of a sequence.
 //!
-//! Weights of morph targets by name; rotation and translation of the node of the first mesh that has targets, as a change
+//! Weights of morph targets by node; rotation and translation of the node of the first mesh that has targets, as a change
 //! from its rest pose. Cubic segments that an easing says become that easing, others are sampled at frames.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
 use glam::{EulerRot, Quat, Vec3};
-use gltf::Node;
-use gltf::animation::{Interpolation, Property, Sampler};
+use gltf::{Mesh, Node};
 use rubor_rig::timeline::{Ease, Key, Sequence, Track};
 
-use super::accessor::floats;
+use super::channels::{Channel, LAST_S, Named, Target, of_animation};
 use super::document::Document;
-use super::foreign::target_names;
-use crate::error::ImportError;
+use super::names::of_mesh;
+use crate::notes::Notes;
 
 /// Rates that times of keys are tried against, in this order.
 const RATES: [f64; 8] = [24.0, 25.0, 30.0, 60.0, 48.0, 50.0, 120.0, 100.0];
 /// Rate of a sequence whose keys lie on no frames.
 const DEFAULT_RATE: f64 = 30.0;
-/// Slopes of an easing may be off by this part of a weight: they are written in f32.
-const SLOPE_ROUNDING: f64 = 1e-4;
+/// Most keys of the motion of the head; longer animations get one every few frames.
+const MOST_KEYS: u32 = 1 << 18;
 
-/// A channel in memory.
-struct Channel<const N: usize> {
-    interpolation: Interpolation,
-    times_s: Vec<f32>,
-    /// N numbers a key; three times as many where it is cubic.
-    numbers: Vec<f32>,
-    /// Numbers of a key.
-    width: usize,
+/// What moves a morph target.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Driver {
+    /// Keys of the animation.
+    Keyed(Track<f32>),
+    /// A default weight other than 0.
+    Default(f32),
+    /// Nothing.
+    Rest,
 }
 
-pub(super) fn read(document: &Document) -> Result<Option<Sequence>, ImportError> {
-    let Some(animation) = document.gltf.animations().next() else { return Ok(None) };
-    let mut shapes: BTreeMap<String, Track<f32>> = BTreeMap::new();
-    let mut channels: Vec<(usize, Property, Sampler<'_>, String)> = Vec::new();
-    for (i, channel) in animation.channels().enumerate() {
-        let target = channel.target();
-        let at = format!("animation 0, channel {i}");
-        channels.push((target.node().index(), target.property(), channel.sampler(), at));
+impl Driver {
+    pub(super) fn track(&self) -> Option<Track<f32>> {
+        match self {
+            Self::Keyed(track) => Some(track.clone()),
+            Self::Default(weight) => Some(Track::Constant(*weight)),
+            Self::Rest => None,
+        }
     }
-    let head = document.gltf.nodes().find(|n| n.mesh().is_some_and(|m| !target_names(&m).is_empty()));
-    let mut times: Vec<f32> = Vec::new();
-    for (_, _, sampler, at) in &channels {
-        times.extend(floats::<1>(document, at, &sampler.input())?.as_flattened());
-    }
-    let end_s = f64::from(times.iter().copied().fold(0.0, f32::max));
-    let on_frames = |fps: &f64| {
-        times.iter().all(|t| {
-            (f64::from(*t) * fps).fract().abs().min((f64::from(*t) * fps).ceil() - f64::from(*t) * fps) < 1e-3
-        })
-    };
-    let fps = RATES.into_iter().find(on_frames).unwrap_or(DEFAULT_RATE);
-    let mut motion = [None, None];
-    for (node, property, sampler, at) in &channels {
-        let is_head = head.as_ref().is_some_and(|h| h.index() == *node);
-        match property {
-            Property::MorphTargetWeights => {
-                let mesh = document.gltf.nodes().nth(*node).and_then(|n| n.mesh());
-                let names = mesh.map(|m| target_names(&m)).unwrap_or_default();
-                let channel = Channel::<1>::read(document, at, sampler, names.len())?;
-                for (c, name) in names.into_iter().enumerate() {
-                    let track = channel.track(c, fps);
-                    // Several meshes of one face share their shapes.
-                    shapes.entry(name).or_insert(track);
+}
+
+/// Everything that moves.
+#[derive(Default)]
+pub(super) struct Motion {
+    is_animated: bool,
+    name: String,
+    fps: f64,
+    end_s: f64,
+    /// By node: a track for each target of its mesh.
+    weights: HashMap<usize, Vec<Track<f32>>>,
+    /// Of nodes and meshes; a node's win.
+    node_defaults: HashMap<usize, Vec<f32>>,
+    mesh_defaults: HashMap<usize, Vec<f32>>,
+    rotation: Option<Channel>,
+    translation: Option<Channel>,
+}
+
+impl Motion {
+    pub(super) fn read(document: &Document, notes: &mut Notes) -> Self {
+        let count = document.raw["animations"].as_array().map_or(0, Vec::len);
+        let mut unread = Notes::default();
+        let mut motion = Self { fps: DEFAULT_RATE, ..Self::default() };
+        for animation in 0..count {
+            let mut here = Notes::default();
+            if let Some(read) = Self::of_animation(document, animation, &mut here) {
+                motion = read;
+                notes.append(here);
+                if count > 1 {
+                    let message = "only the first animation that moves the head is read";
+                    notes.add(message, format!("animation {animation} of {count}, {:?}", motion.name));
                 }
-            }
-            Property::Rotation if is_head => {
-                motion[0] = Some(Channel::<4>::read(document, at, sampler, 4)?);
-            }
-            Property::Translation if is_head => {
-                let c = Channel::<3>::read(document, at, sampler, 3)?;
-                motion[1] = Some(Channel::<4> {
-                    interpolation: c.interpolation,
-                    times_s: c.times_s,
-                    numbers: c.numbers,
-                    width: 3,
-                });
-            }
-            _ => {}
-        }
-    }
-    let duration = end_s.max(1.0 / fps);
-    let mut sequence = Sequence::still(fps, duration);
-    sequence.description = animation.name().unwrap_or_default().to_owned();
-    sequence.shapes = shapes.into_iter().filter(|(_, t)| *t != Track::Constant(0.0)).collect();
-    if let (Some(node), true) = (head, motion.iter().any(Option::is_some)) {
-        head_motion(&mut sequence, &node, &motion);
-    }
-    Ok(Some(sequence))
-}
-
-impl<const N: usize> Channel<N> {
-    fn read(document: &Document, at: &str, sampler: &Sampler<'_>, width: usize) -> Result<Self, ImportError> {
-        let interpolation = sampler.interpolation();
-        let times = floats::<1>(document, at, &sampler.input())?;
-        let numbers = floats::<N>(document, at, &sampler.output())?.as_flattened().to_vec();
-        let per_key = if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-        let times_s: Vec<f32> = times.into_iter().map(|[t]| t).collect();
-        if times_s.is_empty() || times_s.windows(2).any(|w| w[0] >= w[1]) || times_s[0] < 0.0 {
-            return Err(document.fail(at, "times that do not rise from 0 on", "rising times of keys"));
-        }
-        if numbers.len() != times_s.len() * width * per_key {
-            let found = format!("{} numbers", numbers.len());
-            let expected = format!("{} for {} keys", times_s.len() * width * per_key, times_s.len());
-            return Err(document.fail(at, found, expected));
-        }
-        Ok(Self { interpolation, times_s, numbers, width })
-    }
-
-    fn is_cubic(&self) -> bool {
-        self.interpolation == Interpolation::CubicSpline
-    }
-
-    fn value(&self, key: usize, c: usize) -> f32 {
-        if self.is_cubic() {
-            self.numbers[(3 * key + 1) * self.width + c]
-        } else {
-            self.numbers[key * self.width + c]
-        }
-    }
-
-    /// Slopes out of a key and into the next, times the way between them.
-    fn slopes(&self, key: usize, c: usize) -> [f64; 2] {
-        let length = f64::from(self.times_s[key + 1]) - f64::from(self.times_s[key]);
-        let at = |i: usize| length * f64::from(self.numbers[i * self.width + c]);
-        [at(3 * key + 2), at(3 * (key + 1))]
-    }
-
-    /// Number `c` at a time, as players interpolate it; rotations are made unit afterwards.
-    fn at(&self, time_s: f64, c: usize) -> f32 {
-        let next = self.times_s.partition_point(|t| f64::from(*t) <= time_s);
-        let Some(key) = next.checked_sub(1) else { return self.value(0, c) };
-        if next == self.times_s.len() {
-            return self.value(key, c);
-        }
-        let (from, to) = (f64::from(self.times_s[key]), f64::from(self.times_s[next]));
-        let u = (time_s - from) / (to - from);
-        let (a, b) = (f64::from(self.value(key, c)), f64::from(self.value(next, c)));
-        let value = match self.interpolation {
-            Interpolation::Step => a,
-            Interpolation::Linear => a + u * (b - a),
-            Interpolation::CubicSpline => hermite(a, b, self.slopes(key, c), u),
-        };
-        value as f32
-    }
-
-    fn track(&self, c: usize, fps: f64) -> Track<f32> {
-        let mut keys: Vec<Key<f32>> = Vec::new();
-        for (i, time) in self.times_s.iter().enumerate() {
-            let key = |ease| Key { t: f64::from(*time), v: self.value(i, c), ease };
-            let Some(next) = self.times_s.get(i + 1) else {
-                keys.push(key(Ease::Linear));
                 break;
-            };
-            match self.ease(i, c) {
-                Some(ease) => keys.push(key(ease)),
-                None => {
-                    keys.push(key(Ease::Linear));
-                    let mut frame = (f64::from(*time) * fps + 1e-6).floor() + 1.0;
-                    while frame / fps < f64::from(*next) - 1e-6 {
-                        keys.push(Key { t: frame / fps, v: self.at(frame / fps, c), ease: Ease::Linear });
-                        frame += 1.0;
+            }
+            unread.append(here);
+        }
+        if count > 0 && !motion.is_animated {
+            notes.append(unread);
+            notes.say("the animations of the file move no morph target and not the head: none is read");
+        }
+        motion.defaults(document, notes);
+        motion
+    }
+
+    /// `None` where an animation has no channel of the head.
+    fn of_animation(document: &Document, animation: usize, notes: &mut Notes) -> Option<Self> {
+        let head = head_node(document).map(|n| n.index());
+        let mut read: Vec<(Named, Channel)> = Vec::new();
+        for named in of_animation(document, animation, notes) {
+            let width = match named.target {
+                Target::Rotation if head == Some(named.node) => 4,
+                Target::Translation if head == Some(named.node) => 3,
+                Target::Weights => match target_count(document, named.node) {
+                    0 => {
+                        notes.add("weights of nodes without morph targets move nothing", named.at);
+                        continue;
                     }
+                    count => count,
+                },
+                Target::Rotation | Target::Translation | Target::Scale => {
+                    let message = "channels that move other nodes than the head, or scale, are not read";
+                    notes.add(message, named.at);
+                    continue;
                 }
+            };
+            if let Some(channel) = Channel::read(document, &named, width, notes) {
+                read.push((named, channel));
             }
         }
-        simplified(keys)
-    }
-
-    /// The easing of a segment, if one is this curve.
-    fn ease(&self, key: usize, c: usize) -> Option<Ease> {
-        match self.interpolation {
-            Interpolation::Step => return Some(Ease::Step),
-            Interpolation::Linear => return Some(Ease::Linear),
-            Interpolation::CubicSpline => {}
+        if read.is_empty() {
+            return None;
         }
-        let change = f64::from(self.value(key + 1, c)) - f64::from(self.value(key, c));
-        let slopes = self.slopes(key, c);
-        let close = |a: f64, b: f64| (a - b).abs() <= SLOPE_ROUNDING;
-        [
-            (Ease::Linear, [1.0, 1.0]),
-            (Ease::Smooth, [0.0, 0.0]),
-            (Ease::EaseIn, [0.0, 2.0]),
-            (Ease::EaseOut, [2.0, 0.0]),
-        ]
-        .into_iter()
-        .find(|(_, s)| close(slopes[0], s[0] * change) && close(slopes[1], s[1] * change))
-        .map(|(ease, _)| ease)
-    }
-}
-
-fn hermite(a: f64, b: f64, slopes: [f64; 2], u: f64) -> f64 {
-    let (u2, u3) = (u * u, u * u * u);
-    let from_a = 2.0 * u3 - 3.0 * u2 + 1.0;
-    from_a * a + (1.0 - from_a) * b + (u3 - 2.0 * u2 + u) * slopes[0] + (u3 - u2) * slopes[1]
-}
-
-/// Without keys between which nothing changes, and without those that a jump by two neighbouring times made.
-fn simplified(keys: Vec<Key<f32>>) -> Track<f32> {
-    let mut out: Vec<Key<f32>> = Vec::with_capacity(keys.len());
-    for (i, key) in keys.iter().enumerate() {
-        if let Some(before) = out.last_mut() {
-            // Two keys that f32 times can hardly tell apart are a jump: the earlier one holds until the later.
-            let at_once = key.t - before.t < 1e-6 * key.t.max(1.0);
-            if at_once {
-                let before_jump = before.clone();
-                out.pop();
-                match out.last_mut() {
-                    Some(held) if held.v == before_jump.v => held.ease = Ease::Step,
-                    _ => out.push(Key { t: before_jump.t, ..before_jump }),
+        let times = || read.iter().flat_map(|(_, c)| &c.times_s).map(|t| f64::from(t.max(0.0)));
+        let on_frames = |fps: &f64| {
+            let off = |t: f64| (t * fps).fract().abs().min((t * fps).ceil() - t * fps);
+            times().all(|t| off(t) < 1e-3)
+        };
+        let fps = RATES.into_iter().find(on_frames).unwrap_or(DEFAULT_RATE);
+        let end_s = times().fold(0.0, f64::max).min(f64::from(LAST_S));
+        let name = document.raw["animations"][animation]["name"].as_str().unwrap_or_default().to_owned();
+        let mut motion = Self { is_animated: true, name, fps, end_s, ..Self::default() };
+        for (named, channel) in read {
+            match named.target {
+                Target::Weights => {
+                    let tracks = (0..target_count(document, named.node)).map(|c| channel.track(c, fps));
+                    motion.weights.insert(named.node, tracks.collect());
                 }
-                out.push(key.clone());
-                continue;
-            }
-            let same_after = keys.get(i + 1).is_none_or(|next| next.v == key.v);
-            if before.v == key.v && same_after && i + 1 < keys.len() {
-                continue;
+                Target::Rotation => motion.rotation = Some(channel),
+                Target::Translation => motion.translation = Some(channel),
+                Target::Scale => {}
             }
         }
-        out.push(key.clone());
+        Some(motion)
     }
-    match &out[..] {
-        [] => Track::Constant(0.0),
-        [first, rest @ ..] if rest.iter().all(|k| k.v == first.v) => Track::Constant(first.v),
-        _ => Track::Keys(out),
+
+    fn defaults(&mut self, document: &Document, notes: &mut Notes) {
+        let mut checked = |at: String, weights: Option<&[f32]>, count: usize| {
+            let weights = weights?;
+            if weights.len() != count {
+                let found = format!("{at}: {} weights for {count} targets", weights.len());
+                notes.add(
+                    "default weights are not as many as morph targets: those that are there count",
+                    found,
+                );
+            }
+            if weights.iter().any(|w| !w.is_finite()) {
+                notes.add("default weights beyond the range of f32 count as 0", at);
+            }
+            Some(weights.iter().map(|w| if w.is_finite() { *w } else { 0.0 }).collect::<Vec<f32>>())
+        };
+        for mesh in document.gltf.meshes() {
+            let count = of_mesh(document, &mesh).0.len();
+            if let Some(weights) = checked(format!("mesh {}", mesh.index()), mesh.weights(), count) {
+                self.mesh_defaults.insert(mesh.index(), weights);
+            }
+        }
+        for node in document.gltf.nodes() {
+            let count = target_count(document, node.index());
+            if let Some(weights) = checked(format!("node {}", node.index()), node.weights(), count) {
+                self.node_defaults.insert(node.index(), weights);
+            }
+        }
+    }
+
+    /// What moves a target of a mesh that a node shows.
+    pub(super) fn driver(&self, node: Option<usize>, mesh: &Mesh<'_>, target: usize) -> Driver {
+        if let Some(track) = node.and_then(|n| self.weights.get(&n)).and_then(|tracks| tracks.get(target)) {
+            return Driver::Keyed(track.clone());
+        }
+        let of_node = node.and_then(|n| self.node_defaults.get(&n));
+        let weights = of_node.or_else(|| self.mesh_defaults.get(&mesh.index()));
+        match weights.and_then(|w| w.get(target)) {
+            Some(weight) if *weight != 0.0 => Driver::Default(*weight),
+            _ => Driver::Rest,
+        }
+    }
+
+    /// The sequence of shapes that these drivers move; `None` where nothing does.
+    pub(super) fn sequence(
+        &self,
+        document: &Document,
+        shapes: Vec<(String, Driver)>,
+        notes: &mut Notes,
+    ) -> Option<Sequence> {
+        let mut sequence = Sequence::still(self.fps, self.end_s.max(1.0 / self.fps));
+        sequence.description.clone_from(&self.name);
+        for (name, driver) in shapes {
+            if let Driver::Default(weight) = driver {
+                let message = "default weights are constant tracks of the sequence; the head rests at 0";
+                notes.add(message, format!("{name:?} at {weight}"));
+            }
+            if let Some(track) = driver.track().filter(|t| *t != Track::Constant(0.0)) {
+                sequence.shapes.insert(name, track);
+            }
+        }
+        if !self.is_animated && sequence.shapes.is_empty() {
+            return None;
+        }
+        if let (Some(node), true) =
+            (head_node(document), self.rotation.is_some() || self.translation.is_some())
+        {
+            self.head_motion(&mut sequence, &node, notes);
+        }
+        Some(sequence)
+    }
+
+    /// Rotation and translation of the head at every frame, relative to the rest pose of its node.
+    fn head_motion(&self, sequence: &mut Sequence, node: &Node<'_>, notes: &mut Notes) {
+        let (rest_translation, rest_rotation, _) = node.transform().decomposed();
+        let (rest_translation, rest_rotation) =
+            (Vec3::from_array(rest_translation), Quat::from_array(rest_rotation));
+        let frames = sequence.frame_count() + 1;
+        let step = frames.div_ceil(MOST_KEYS).max(1);
+        if step > 1 {
+            notes.say(format!("the motion of the head is read at every {step}th frame: it is long"));
+        }
+        let times: Vec<f64> = (0..frames).step_by(step as usize).map(|f| sequence.frame_time_s(f)).collect();
+        let mut angles: [Vec<f32>; 3] = Default::default();
+        let mut places: Vec<[f32; 3]> = Vec::new();
+        for time in &times {
+            let turned = match &self.rotation {
+                Some(channel) => Quat::from_array([0, 1, 2, 3].map(|c| channel.at(*time, c))).normalize(),
+                None => rest_rotation,
+            };
+            let moved = match &self.translation {
+                Some(channel) => Vec3::from_array([0, 1, 2].map(|c| channel.at(*time, c))),
+                None => rest_translation,
+            };
+            let turn = turned * rest_rotation.inverse();
+            let turn = if turn.is_finite() { turn } else { Quat::IDENTITY };
+            let (yaw, pitch, roll) = turn.to_euler(EulerRot::YXZ);
+            angles.iter_mut().zip([yaw, pitch, roll]).for_each(|(list, a)| list.push(a.to_degrees()));
+            let place = moved - turn * rest_translation;
+            places.push(if place.is_finite() { place.to_array() } else { [0.0; 3] });
+        }
+        let [yaw, pitch, roll] = angles.map(|list| keyed(&list, &times));
+        sequence.head.yaw_degrees = yaw;
+        sequence.head.pitch_degrees = pitch;
+        sequence.head.roll_degrees = roll;
+        sequence.head.translation = keyed(&places, &times);
     }
 }
 
-/// Rotation and translation of the head at every frame, relative to the rest pose of its node.
-fn head_motion(sequence: &mut Sequence, node: &Node<'_>, [rotation, translation]: &[Option<Channel<4>>; 2]) {
-    let (rest_translation, rest_rotation, _) = node.transform().decomposed();
-    let (rest_translation, rest_rotation) =
-        (Vec3::from_array(rest_translation), Quat::from_array(rest_rotation));
-    let frames = sequence.frame_count() + 1;
-    let mut angles: [Vec<f32>; 3] = Default::default();
-    let mut places: Vec<[f32; 3]> = Vec::new();
-    for frame in 0..frames {
-        let time = sequence.frame_time_s(frame);
-        let turned = match rotation {
-            Some(channel) => Quat::from_array([0, 1, 2, 3].map(|c| channel.at(time, c))).normalize(),
-            None => rest_rotation,
-        };
-        let moved = match translation {
-            Some(channel) => Vec3::from_array([0, 1, 2].map(|c| channel.at(time, c))),
-            None => rest_translation,
-        };
-        let turn = turned * rest_rotation.inverse();
-        let turn = if turn.is_finite() { turn } else { Quat::IDENTITY };
-        let (yaw, pitch, roll) = turn.to_euler(EulerRot::YXZ);
-        angles.iter_mut().zip([yaw, pitch, roll]).for_each(|(list, a)| list.push(a.to_degrees()));
-        places.push((moved - turn * rest_translation).to_array());
-    }
-    let fps = sequence.fps;
-    let [yaw, pitch, roll] = angles.map(|list| keyed(&list, fps, |v| *v));
-    sequence.head.yaw_degrees = yaw;
-    sequence.head.pitch_degrees = pitch;
-    sequence.head.roll_degrees = roll;
-    sequence.head.translation = keyed(&places, fps, |v| *v);
+/// The node of the first mesh that has targets.
+fn head_node(document: &Document) -> Option<Node<'_>> {
+    document
+        .gltf
+        .nodes()
+        .find(|n| n.mesh().is_some_and(|m| m.primitives().any(|p| p.morph_targets().len() > 0)))
 }
 
-/// A key a frame, or a constant.
-fn keyed<A: PartialEq, T: Copy + Default>(values: &[A], fps: f64, value: impl Fn(&A) -> T) -> Track<T> {
+/// Morph targets of the mesh of a node.
+fn target_count(document: &Document, node: usize) -> usize {
+    let mesh = document.gltf.nodes().nth(node).and_then(|n| n.mesh());
+    mesh.and_then(|m| m.primitives().map(|p| p.morph_targets().len()).max()).unwrap_or(0)
+}
+
+/// A key at every time, or a constant.
+fn keyed<T: PartialEq + Copy + Default>(values: &[T], times: &[f64]) -> Track<T> {
     match values {
         [] => Track::Constant(T::default()),
-        [first, rest @ ..] if rest.iter().all(|v| v == first) => Track::Constant(value(first)),
+        [first, rest @ ..] if rest.iter().all(|v| v == first) => Track::Constant(*first),
         _ => {
-            let key = |(i, v): (usize, &A)| Key { t: i as f64 / fps, v: value(v), ease: Ease::Linear };
-            Track::Keys(values.iter().enumerate().map(key).collect())
+            let key = |(v, t): (&T, &f64)| Key { t: *t, v: *v, ease: Ease::Linear };
+            Track::Keys(values.iter().zip(times).map(key).collect())
         }
     }
 }

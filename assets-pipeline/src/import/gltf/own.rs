@@ -8,23 +8,28 @@ use rubor_rig::head::{
 use rubor_rig::map::Map;
 
 use super::document::Document;
-use super::{ImportedHead, accessor};
+use super::motion::{Driver, Motion};
+use super::{ImportedHead, accessor, names};
 use crate::error::ImportError;
 use crate::facial_appearance::{ChannelLayout, FacialAppearance, MapEntries, MapEntry, NAME, VERSION};
 
-pub(super) fn read(document: &Document, extension: &serde_json::Value) -> Result<ImportedHead, ImportError> {
+pub(super) fn read(
+    document: &Document,
+    extension: &serde_json::Value,
+    motion: &Motion,
+) -> Result<(ImportedHead, Vec<(String, Driver)>), ImportError> {
     let version = &extension["version"];
     if version.as_u64() != Some(u64::from(VERSION)) {
         return Err(document.fail(NAME, format!("version {version}"), format!("version {VERSION}")));
     }
     let extension: FacialAppearance = serde_json::from_value(extension.clone())
         .map_err(|e| document.fail(NAME, e.to_string(), "the published schema"))?;
-    let mesh = document
+    let source = document
         .gltf
         .meshes()
         .nth(extension.mesh as usize)
         .ok_or_else(|| document.fail(NAME, format!("mesh {}", extension.mesh), "an existing mesh"))?;
-    let (mesh, shapes) = geometry(document, &mesh, &extension)?;
+    let (mesh, shapes) = geometry(document, &source, &extension)?;
     let mut head = Head {
         name: extension.name,
         mesh,
@@ -54,7 +59,15 @@ pub(super) fn read(document: &Document, extension: &serde_json::Value) -> Result
             .map(|(point, [at_half, at_full])| OcclusionChange { point, at_half, at_full })
             .collect();
     }
-    Ok(ImportedHead { head, rig: extension.rig, sequence: extension.sequence, animation: None })
+    let node = document.gltf.nodes().find(|n| n.mesh().is_some_and(|m| m.index() == source.index()));
+    let drivers = head.shapes.iter().enumerate().map(|(t, shape)| {
+        let driver = motion.driver(node.as_ref().map(gltf::Node::index), &source, t);
+        (shape.name.clone(), driver)
+    });
+    let drivers = drivers.collect();
+    let imported =
+        ImportedHead { head, rig: extension.rig, sequence: extension.sequence, ..ImportedHead::default() };
+    Ok((imported, drivers))
 }
 
 fn geometry(
@@ -62,7 +75,8 @@ fn geometry(
     source: &gltf::Mesh<'_>,
     extension: &FacialAppearance,
 ) -> Result<(Mesh, Vec<BlendShape>), ImportError> {
-    let names = super::foreign::target_names(source);
+    let (names, _) = names::of_mesh(document, source);
+    let names: Vec<String> = names.into_iter().map(|n| n.text).collect();
     let count = source.primitives().count();
     if extension.parts.len() != count {
         let found = format!("{} parts", extension.parts.len());
