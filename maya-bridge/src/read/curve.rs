@@ -70,6 +70,10 @@ impl Curve {
         self.keys[0].time_s
     }
 
+    pub(super) fn times_s(&self) -> impl Iterator<Item = f64> {
+        self.keys.iter().map(|k| k.time_s)
+    }
+
     pub(super) fn last_s(&self) -> f64 {
         self.keys[self.keys.len() - 1].time_s
     }
