@@ -290,7 +290,7 @@ impl<'a> Parser<'a> {
                 let expected = format!("at most {MOST_INSTANCES}");
                 return Err(Fault::new(line, format!("{} instances", self.instances), expected));
             }
-            self.scene.nodes[below].other_parents.push(above);
+            self.scene.add_instance(below, above);
         }
         Ok(())
     }

@@ -294,6 +294,13 @@ impl Scene {
         self.nodes.len() - 1
     }
 
+    /// Puts a node below a further parent; paths find it there too.
+    pub(crate) fn add_instance(&mut self, node: NodeId, parent: NodeId) {
+        let name = self.nodes[node].name.clone();
+        self.by_parent.entry((Some(parent), name)).or_insert(node);
+        self.nodes[node].other_parents.push(parent);
+    }
+
     pub(crate) fn connect(&mut self, from: Plug, to: Plug) {
         let index = self.connections.len();
         self.by_destination.insert((to.node, to.attribute.clone()), index);
