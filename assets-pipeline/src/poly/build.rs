@@ -5,14 +5,13 @@ use std::collections::HashMap;
 use glam::Vec3;
 use rubor_rig::head::{BlendShape, Head, Material, Mesh, Part, Vertex};
 
-use super::{Corner, PolyMesh, Shape};
+use super::{Corner, PolyMesh, Shape, triangulate};
 
 /// Which group becomes which part: (group, name of the part, material), in the order of the parts.
 /// Groups with the same part name are merged; groups not named here are dropped.
 pub type HeadParts<'a> = &'a [(&'a str, &'a str, Material)];
 
-/// Triangulates the groups of `parts` (quads along the shorter diagonal), drops unused points and offsets not longer
-/// than `threshold`. Returns the head and the new index of each old point (`u32::MAX` when dropped).
+/// Triangulates the groups of `parts` by [`triangulate`], drops unused points and offsets not longer than `threshold`. Returns the head and the new index of each old point (`u32::MAX` when dropped).
 pub fn build_head(
     mesh: &PolyMesh,
     shapes: &[Shape],
@@ -42,14 +41,9 @@ pub fn build_head(
                 })
             };
             let face = mesh.face(f);
-            let at = |k: usize| mesh.points[face[k].point as usize];
-            let first = if face.len() == 4 && at(1).distance_squared(at(3)) < at(0).distance_squared(at(2)) {
-                1
-            } else {
-                0
-            };
-            let corners: Vec<u32> = (0..face.len()).map(|k| vertex(face[(k + first) % face.len()])).collect();
-            out.triangles.extend((2..corners.len()).map(|k| [corners[0], corners[k - 1], corners[k]]));
+            let corners: Vec<u32> = face.iter().map(|c| vertex(*c)).collect();
+            let places: Vec<Vec3> = face.iter().map(|c| mesh.points[c.point as usize]).collect();
+            out.triangles.extend(triangulate(&places).iter().map(|t| t.map(|k| corners[k as usize])));
         }
         let end = out.triangles.len() as u32;
         if end > start {

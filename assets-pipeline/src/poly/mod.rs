@@ -11,11 +11,13 @@ mod build;
 mod clip;
 mod stencil;
 mod subdivide;
+mod triangulate;
 
 use glam::{Vec2, Vec3};
 
 pub use build::{HeadParts, build_head};
 pub use stencil::Stencils;
+pub use triangulate::triangulate;
 
 /// Corner of a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use rubor_assets::import::materials::guess_material;
+use rubor_assets::poly::triangulate;
 use rubor_rig::expression::Inbetween;
 use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange, Part, Vertex};
 
@@ -216,19 +217,15 @@ impl<'s> Assembly<'s> {
             // Every pair was put in above.
             first_vertex + pairs.binary_search(&(uv, point)).unwrap_or_default() as u32
         };
-        let at = |corner: [u32; 2]| Vec3::from(polygons.points[corner[0] as usize]);
         for (name, material, faces) in groups {
             let start = self.head.mesh.triangles.len() as u32;
-            for face in faces.into_iter().map(|f| &polygons.faces[f as usize]).filter(|f| f.len() >= 3) {
-                let shorter = face.len() == 4
-                    && at(face[1]).distance_squared(at(face[3])) < at(face[0]).distance_squared(at(face[2]));
-                let first = usize::from(shorter);
-                let corner = |k: usize| vertex(face[(k + first) % face.len()]);
-                let fan = (2..face.len()).map(|k| {
-                    let [a, b, c] = [corner(0), corner(k - 1), corner(k)];
-                    if turned { [a, c, b] } else { [a, b, c] }
-                });
-                self.head.mesh.triangles.extend(fan);
+            for face in faces.into_iter().map(|f| &polygons.faces[f as usize]) {
+                let border: Vec<Vec3> =
+                    face.iter().map(|[point, _]| Vec3::from(polygons.points[*point as usize])).collect();
+                for triangle in triangulate(&border) {
+                    let [a, b, c] = triangle.map(|corner| vertex(face[corner as usize]));
+                    self.head.mesh.triangles.push(if turned { [a, c, b] } else { [a, b, c] });
+                }
             }
             let end = self.head.mesh.triangles.len() as u32;
             self.head.mesh.parts.push(Part { name, material, triangles: start..end });
