@@ -330,7 +330,7 @@ fn geometry() -> Vec<Case> {
             |i| assert!(normals(i).iter().all(|n| n.z < 0.0)),
         ),
         read(
-            "shear, `offsetParentMatrix`, `inheritsTransform`",
+            "shear, `offsetParentMatrix`",
             "points in the world",
             plain()
                 .transform("setAttr \".sh\" -type \"double3\" 0.5 0 0;")
@@ -341,6 +341,16 @@ fn geometry() -> Vec<Case> {
                 assert!((i.head.mesh.points[8] - Vec3::new(0.06, 0.04, 0.07)).length() < 1e-6);
             },
         ),
+        Case {
+            what: "a transform that does not inherit (`inheritsTransform`)",
+            becomes: "points in the world, without what is above it",
+            bytes: Scene::new()
+                .text()
+                .replace("createNode transform -n \"face\";", "createNode transform -n \"up\";\n\tsetAttr \".tx\" 5;\ncreateNode transform -n \"face\" -p \"up\";\n\tsetAttr \".it\" no;\n\tsetAttr \".ty\" 1;")
+                .into_bytes(),
+            said: &[],
+            check: Check::Read(|i| assert!((i.head.mesh.points[0] - Vec3::new(0.0, 0.01, 0.0)).length() < 1e-6)),
+        },
         Case {
             what: "concave polygons",
             becomes: "triangles that cover them; a quad is split along its shorter diagonal that lies inside",
@@ -647,6 +657,77 @@ fn many_of_one_kind_cost_no_square() {
     assert_eq!(imported.head.shapes.len(), 50_000);
     // Seconds where each looks at all others; a busy machine gets its time.
     assert!(started.elapsed().as_secs_f64() < 20.0, "{:?}", started.elapsed());
+}
+
+/// `RUBOR_MUTATIONS` sets the number of files.
+#[test]
+fn mutated_scenes_end_in_a_head_or_an_error_in_bounded_time() {
+    let rounds = std::env::var("RUBOR_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(400);
+    let hostile = [
+        "50000000",
+        "-1",
+        "1e300",
+        "nan",
+        "1e-320",
+        ";",
+        "\"",
+        "yes",
+        "[0:49999999]",
+        "[49999999]",
+        "\"vtx[0:49999999]\"",
+        "parent -add \"face\" \"brow\";",
+        "connectAttr \"bs.og[0]\" \"bs.ip[0].ig\";",
+        "2147483648",
+    ];
+    let seeds: Vec<Vec<u8>> = cases().into_iter().map(|c| c.bytes).filter(|b| b.len() < 100_000).collect();
+    let mut state = 14_u64;
+    // SplitMix64.
+    let mut next = |end: usize| {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % end.max(1) as u64) as usize
+    };
+    let (mut read, mut refused, mut slowest) = (0, 0, 0.0_f64);
+    for round in 0..rounds {
+        let mut bytes = seeds[round % seeds.len()].clone();
+        for _ in 0..1 + next(3) {
+            let at = next(bytes.len());
+            let to = (at + next(200)).min(bytes.len());
+            match next(6) {
+                0 => bytes[at] = next(256) as u8,
+                1 => bytes.truncate(at.max(1)),
+                2 | 3 => {
+                    let token = hostile[next(hostile.len())].bytes();
+                    bytes.splice(at..(at + next(9)).min(bytes.len()), token).for_each(drop);
+                }
+                4 => bytes.drain(at..to).for_each(drop),
+                _ => {
+                    let copy = bytes[at..to].to_vec();
+                    bytes.splice(at..at, copy).for_each(drop);
+                }
+            }
+            if bytes.is_empty() {
+                bytes.push(b' ');
+            }
+        }
+        let started = std::time::Instant::now();
+        match read::from_bytes(&bytes, Path::new("mutated.ma"), &read::Options::default()) {
+            Ok(imported) => {
+                imported.head.validate().unwrap();
+                if let Some(sequence) = imported.sequence {
+                    sequence.check().unwrap();
+                }
+                read += 1;
+            }
+            Err(_) => refused += 1,
+        }
+        slowest = slowest.max(started.elapsed().as_secs_f64());
+        // A shared machine gets its time; most files take a millisecond.
+        assert!(slowest < 10.0, "round {round}: {slowest} s");
+    }
+    eprintln!("{rounds} mutated scenes: {read} read, {refused} refused, the slowest in {slowest:.3} s");
+    assert!(read > rounds / 20 && refused > rounds / 20, "{read} read, {refused} refused");
 }
 
 /// Right values of the cases in the shared folder, which are not ours to keep here.

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use glam::{DAffine3, EulerRot};
 use rubor_rig::timeline::{Key, Sequence, Track};
 
-use super::curve::Curve;
+use super::curve::{Baking, Curve, MOST_BAKED_FRAMES};
 use super::geometry::{Instance, local_matrix, world_matrix};
 use super::head::Built;
 use super::weight::{Drive, Effect};
@@ -97,19 +97,12 @@ pub(super) fn sequence(scene: &Scene, built: &Built<'_>, notes: &mut Notes) -> O
     let rate = if (2.0..=10_000.0).contains(&fps) { fps } else { 24.0 };
 
     let mut sequence = Sequence::still(rate, duration.max(1.0 / rate));
-    let mut baked = 0;
+    let mut baking = Baking::default();
     for (shape, played) in &weights {
         let track = match played {
             Played::Constant(value) => Track::Constant(*value as f32),
-            Played::Scaled(curve, scale) => {
-                let (track, segments) = curve.track(start_s, rate, |v| (v * scale) as f32);
-                baked += segments;
-                track
-            }
-            Played::Product(curves, scale) => {
-                baked += 1;
-                product(curves, *scale, start_s, rate)
-            }
+            Played::Scaled(curve, scale) => curve.track(start_s, rate, &mut baking, |v| (v * scale) as f32),
+            Played::Product(curves, scale) => product(curves, *scale, start_s, rate, &mut baking),
         };
         let (low, high) = range_of(&track);
         if low < 0.0 || high > 1.0 {
@@ -123,12 +116,19 @@ pub(super) fn sequence(scene: &Scene, built: &Built<'_>, notes: &mut Notes) -> O
     match &movers[..] {
         // Our own head: its angles are the tracks.
         [only] if Some(only.node) == built.carrier && only.is_plain() => {
-            baked += direct(only, &mut sequence, start_s, rate);
+            direct(only, &mut sequence, start_s, rate, &mut baking);
         }
         _ if moving => bake(scene, &movers, built, &mut sequence, start_s, notes),
         _ => {}
     }
-    if baked > 0 {
+    if baking.too_long > 0 {
+        notes.say(format!(
+            "{} curve segments are too long to be sampled at frames (more than {MOST_BAKED_FRAMES} in all) and are straight lines",
+            baking.too_long
+        ));
+    }
+    if baking.segments > 0 {
+        let baked = baking.segments;
         notes.say(format!("{baked} curve segments have no easing like them and were sampled at every frame"));
     }
     match sequence.check() {
@@ -176,13 +176,14 @@ fn part(scene: &Scene, drive: &Drive<'_>, notes: &mut Notes) -> Part {
 }
 
 /// Two curves multiplied, sampled at their keys and at every frame between the first and the last.
-fn product(curves: &[Curve; 2], scale: f64, start_s: f64, fps: f64) -> Track<f32> {
+fn product(curves: &[Curve; 2], scale: f64, start_s: f64, fps: f64, baking: &mut Baking) -> Track<f32> {
     let first = curves.iter().map(Curve::first_s).fold(f64::INFINITY, f64::min) - start_s;
     let last = curves.iter().map(Curve::last_s).fold(f64::NEG_INFINITY, f64::max) - start_s;
     let mut times: Vec<f64> =
         curves.iter().flat_map(Curve::times_s).map(|t| (t - start_s).max(0.0)).collect();
     let from = (first * fps).max(0.0).ceil();
-    let count = ((last * fps - from).floor() + 1.0).clamp(0.0, MOST_FRAMES) as u64;
+    let count = ((last * fps - from).floor() + 1.0).max(0.0);
+    let count = if baking.segment(count) { count as u64 } else { 0 };
     times.extend((0..count).map(|frame| (from + frame as f64) / fps));
     times.sort_by(f64::total_cmp);
     times.dedup_by(|later, earlier| *later - *earlier < 1e-9);
@@ -311,9 +312,8 @@ fn visibility_is_not_followed(scene: &Scene, node: NodeId, notes: &mut Notes) {
     }
 }
 
-/// Channels of our own transform as tracks; returns the number of baked segments.
-fn direct(mover: &Mover<'_>, sequence: &mut Sequence, start_s: f64, fps: f64) -> usize {
-    let mut baked = 0;
+/// Channels of our own transform as tracks.
+fn direct(mover: &Mover<'_>, sequence: &mut Sequence, start_s: f64, fps: f64, baking: &mut Baking) {
     let degrees = |v: f64| v.to_degrees() as f32;
     let rotate = mover.transform.rotate;
     let head = &mut sequence.head;
@@ -321,27 +321,18 @@ fn direct(mover: &Mover<'_>, sequence: &mut Sequence, start_s: f64, fps: f64) ->
     let angles = [(&mut head.pitch_degrees, 3), (&mut head.yaw_degrees, 4), (&mut head.roll_degrees, 5)];
     for (track, i) in angles {
         *track = match &mover.channels[i] {
-            Some(curve) => {
-                let (track, segments) = curve.track(start_s, fps, degrees);
-                baked += segments;
-                track
-            }
+            Some(curve) => curve.track(start_s, fps, baking, degrees),
             None => Track::Constant(degrees(rotate[i - 3])),
         };
     }
     let metres = |v: f64| (v * 0.01) as f32;
     let tracks: Vec<Track<f32>> = (0..3)
         .map(|i| match &mover.channels[i] {
-            Some(curve) => {
-                let (track, segments) = curve.track(start_s, fps, metres);
-                baked += segments;
-                track
-            }
+            Some(curve) => curve.track(start_s, fps, baking, metres),
             None => Track::Constant(metres(mover.transform.translate_cm[i])),
         })
         .collect();
     head.translation = together(&tracks);
-    baked
 }
 
 /// Three tracks as one. Keys of the same times and easings stay; otherwise every time of any of them gets a key.
