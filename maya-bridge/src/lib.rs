@@ -26,6 +26,7 @@
 mod appearance;
 mod ascii;
 pub mod error;
+mod notes;
 pub mod read;
 pub mod write;
 

@@ -10,6 +10,9 @@
 //! ICT FaceKit splits `browInnerUp` and `cheekPuff` into halves: one written name may drive two shapes of a head,
 //! and two written halves share the one shape of a head that has no halves.
 
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 use crate::head::Head;
 
 /// The 52 blend shapes of Apple's ARKit face anchor, canonical spelling.
@@ -295,10 +298,15 @@ impl Key {
 /// assert_eq!(canonical("eyeBlink"), None); // a pair, not a shape
 /// ```
 pub fn canonical(written: &str) -> Option<&'static str> {
-    let find = |name: &str| {
-        let key = Key::new(name);
-        vocabulary().find(|known| Key::new(known) == key)
-    };
+    // Made once: files have up to 100 000 names.
+    static BY_KEY: LazyLock<HashMap<Key, &'static str>> = LazyLock::new(|| {
+        let mut by_key = HashMap::new();
+        for known in vocabulary() {
+            by_key.entry(Key::new(known)).or_insert(known);
+        }
+        by_key
+    });
+    let find = |name: &str| BY_KEY.get(&Key::new(name)).copied();
     find(written).or_else(|| find(written.rsplit(['.', ':', '|']).next()?))
 }
 

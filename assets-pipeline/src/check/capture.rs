@@ -6,6 +6,9 @@ use rubor_rig::names::{ARKIT, Key, Resolver, nearest, vocabulary};
 use super::{Finding, list};
 use crate::import::capture::{Recording, Report, Retarget, to_sequence};
 
+/// Columns of one kind that get a finding, with the nearest name, of their own; the rest is summed.
+const MOST_APART: usize = 16;
+
 /// Columns that move nothing, entries without a column, channels that never change.
 pub fn check(recording: &Recording, retarget: &Retarget, head: &Head) -> Vec<Finding> {
     let (sequence, report) = match to_sequence(recording, retarget, None) {
@@ -14,7 +17,7 @@ pub fn check(recording: &Recording, retarget: &Retarget, head: &Head) -> Vec<Fin
     };
     let mut findings: Vec<Finding> = report.notes.iter().map(|n| Finding::warning("", n.clone())).collect();
     let Report { unmapped, unused, limited, .. } = &report;
-    for channel in unmapped {
+    for channel in unmapped.iter().take(MOST_APART) {
         let message = "no shape is known for this column: it moves nothing";
         let fix = match nearest(channel, vocabulary()) {
             Some(near) => {
@@ -24,7 +27,19 @@ pub fn check(recording: &Recording, retarget: &Retarget, head: &Head) -> Vec<Fin
         };
         findings.push(Finding::warning(format!("column {channel:?}"), message).fix(fix));
     }
-    for entry in unused {
+    let rest = unmapped.len().saturating_sub(MOST_APART);
+    if rest > 0 {
+        let first: Vec<&str> = unmapped[MOST_APART..].iter().take(MOST_APART).map(String::as_str).collect();
+        let message =
+            format!("{rest} further columns move nothing, as no shape is known: {}, ...", list(&first));
+        findings.push(Finding::warning("", message).fix("name shapes in the retarget file, or null"));
+    }
+    let rest = unused.len().saturating_sub(MOST_APART);
+    if rest > 0 {
+        let message = format!("{rest} further entries of the retarget file have no column");
+        findings.push(Finding::warning("", message).fix("remove the entries"));
+    }
+    for entry in unused.iter().take(MOST_APART) {
         let message = "the retarget file names it, and the recording has no such column";
         let channels = recording.channels.iter().map(|c| c.name.as_str());
         let finding = Finding::warning(format!("column {entry:?}"), message);

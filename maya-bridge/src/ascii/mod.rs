@@ -1,5 +1,6 @@
 //! Maya ASCII as text: words, statements, nodes.
 
+mod code_page;
 pub(crate) mod lexer;
 pub(crate) mod parser;
 pub(crate) mod scene;

@@ -1,14 +1,21 @@
 //! Statements to a [`Scene`]: one pass, values go straight to where they stay.
 
+use super::code_page;
 use super::lexer::{Lexer, Token};
 use super::scene::{
-    BlendShapeData, CurveData, Data, MeshData, Node, NodeId, Plug, PolyCube, Scene, Transform,
+    BlendShapeData, CurveData, Data, MeshData, Node, NodeId, Plug, PolyCube, Scene, Transform, TweakData,
 };
 use super::words::{fps, metres, number, short};
 use crate::error::Fault;
+use crate::notes::Notes;
 
 /// Largest index of an array attribute: a scene that names a larger one is broken, and would fill the memory.
 const LARGEST_INDEX: u64 = 50_000_000;
+
+/// Most nodes above one another.
+const DEEPEST: usize = 1000;
+/// Most instances that a scene adds.
+const MOST_INSTANCES: usize = 10_000;
 
 /// Plugins whose nodes carry nothing that a head needs.
 const HARMLESS_PLUGINS: [&str; 8] = [
@@ -24,12 +31,19 @@ const HARMLESS_PLUGINS: [&str; 8] = [
 
 /// Reads a scene.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Scene, Fault> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if bytes.starts_with(b"FOR4") || bytes.starts_with(b"FOR8") {
         return Err(Fault::new(1, "a Maya binary scene (.mb)", "Maya ASCII: save the scene as .ma"));
     }
-    let mut parser =
-        Parser { lexer: Lexer::new(bytes), scene: Scene::default(), current: None, links: Vec::new() };
+    let mut notes = Notes::default();
+    let text = code_page::to_utf8(bytes, &mut notes);
+    let mut parser = Parser {
+        lexer: Lexer::new(&text),
+        scene: Scene::default(),
+        current: None,
+        links: Vec::new(),
+        instances: 0,
+    };
+    parser.scene.notes = notes;
     let mut statements = 0;
     let mut known = 0;
     while let Some(token) = parser.lexer.next()? {
@@ -47,10 +61,15 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Scene, Fault> {
             b"currentUnit" => parser.current_unit()?,
             b"requires" => parser.requires()?,
             b"file" => parser.reference()?,
-            b"rename" | b"addAttr" | b"fileInfo" | b"lockNode" | b"parent" | b"relationship"
-            | b"dataStructure" | b"applyMetadata" | b"editMetadata" | b"namespace" | b"workspace"
-            | b"evaluator" | b"disconnectAttr" | b"scriptJob" | b"source" | b"python" | b"warning"
-            | b"undo" => parser.lexer.skip_statement()?,
+            b"parent" => parser.parent()?,
+            b"disconnectAttr" | b"deleteAttr" | b"delete" => {
+                let note = "statements that are not followed (save the scene again in Maya)";
+                parser.scene.notes.about(note, String::from_utf8_lossy(command));
+                parser.lexer.skip_statement()?;
+            }
+            b"rename" | b"addAttr" | b"fileInfo" | b"lockNode" | b"relationship" | b"dataStructure"
+            | b"applyMetadata" | b"editMetadata" | b"namespace" | b"workspace" | b"evaluator"
+            | b"scriptJob" | b"source" | b"python" | b"warning" | b"undo" => parser.lexer.skip_statement()?,
             _ => {
                 known -= 1;
                 parser.lexer.skip_statement()?;
@@ -72,6 +91,7 @@ struct Parser<'a> {
     current: Option<NodeId>,
     /// Connections as written; nodes may be created after them.
     links: Vec<(Box<str>, Box<str>)>,
+    instances: usize,
 }
 
 /// An attribute path: `.it[0].itg[3].iti[6000].ipt` is `it`, 0, `itg`, 3, ...
@@ -202,14 +222,93 @@ impl<'a> Parser<'a> {
             "transform" | "joint" => Data::Transform(Box::default()),
             "mesh" => Data::Mesh(Box::<MeshData>::default()),
             "blendShape" => Data::BlendShape(Box::<BlendShapeData>::default()),
+            "tweak" => Data::Tweak(Box::<TweakData>::default()),
             "animCurveTL" | "animCurveTA" | "animCurveTU" => Data::Curve(Box::<CurveData>::default()),
             "polyCube" => Data::PolyCube(PolyCube::default()),
             "script" => Data::Script(String::new()),
             _ => Data::Other,
         };
         let name = name.unwrap_or_else(|| format!("{kind}{}", self.scene.nodes.len()));
-        self.current = Some(self.scene.add(Node { kind, name, parent, line, data }));
+        let depth = parent.map_or(0, |p| self.scene.nodes[p].depth + 1);
+        if depth > DEEPEST {
+            let found = format!("{name} below {depth} others");
+            return Err(Fault::new(line, found, format!("at most {DEEPEST} nodes above one another")));
+        }
+        let node = Node {
+            kind,
+            name,
+            parent,
+            other_parents: Vec::new(),
+            depth,
+            line,
+            state: 0,
+            envelope: 1.0,
+            data,
+        };
+        self.current = Some(self.scene.add(node));
         Ok(())
+    }
+
+    /// `parent -s -nc -r -add "|eyeLeft|eyeShape" "eyeRight";` makes an instance.
+    fn parent(&mut self) -> Result<(), Fault> {
+        let line = self.lexer.line();
+        let mut add = false;
+        let mut names = Vec::new();
+        while let Some(token) = self.lexer.argument()? {
+            match token {
+                Token::Word(b"-add" | b"-addObject") => add = true,
+                Token::Word(word) if word.starts_with(b"-") => {}
+                Token::Word(word) => names.push(String::from_utf8_lossy(word).into_owned()),
+                Token::Text(text) => names.push(text.into_owned()),
+                Token::End => {}
+            }
+        }
+        self.lexer.skip_statement()?;
+        let Some((parent, children)) = names.split_last().filter(|(_, children)| !children.is_empty()) else {
+            return Ok(());
+        };
+        if !add {
+            let note = "statements that are not followed (save the scene again in Maya)";
+            self.scene.notes.about(note, format!("line {line}: parent of {}", children.join(", ")));
+            return Ok(());
+        }
+        for child in children {
+            let (Some(above), Some(below)) = (self.scene.find(parent), self.scene.find(child)) else {
+                let note = "instances that were left out, as one of both nodes is not in the scene";
+                self.scene.notes.about(note, format!("line {line}: {child} below {parent}"));
+                continue;
+            };
+            if self.is_above(below, above) {
+                return Err(Fault::new(
+                    line,
+                    format!("{child} as its own ancestor"),
+                    "an instance below others",
+                ));
+            }
+            self.instances += 1;
+            if self.instances > MOST_INSTANCES {
+                let expected = format!("at most {MOST_INSTANCES}");
+                return Err(Fault::new(line, format!("{} instances", self.instances), expected));
+            }
+            self.scene.add_instance(below, above);
+        }
+        Ok(())
+    }
+
+    /// True if a node is another one or above it.
+    fn is_above(&self, above: NodeId, node: NodeId) -> bool {
+        let mut seen = std::collections::HashSet::new();
+        let mut open = vec![node];
+        while let Some(at) = open.pop() {
+            if at == above {
+                return true;
+            }
+            if seen.insert(at) {
+                let node = &self.scene.nodes[at];
+                open.extend(node.parent.iter().chain(&node.other_parents));
+            }
+        }
+        false
     }
 
     fn text_argument(&mut self) -> Result<Option<String>, Fault> {
@@ -279,10 +378,7 @@ impl<'a> Parser<'a> {
             && plugin != "maya"
             && !HARMLESS_PLUGINS.contains(&plugin.as_str())
         {
-            let note = format!("the scene requires {}: its nodes are not read", words.join(" "));
-            if !self.scene.notes.contains(&note) {
-                self.scene.notes.push(note);
-            }
+            self.scene.notes.about("the scene requires plugins whose nodes are not read", words.join(" "));
         }
         self.lexer.skip_statement()
     }
@@ -299,9 +395,8 @@ impl<'a> Parser<'a> {
             }
         }
         if let Some(file) = last.filter(|_| is_reference) {
-            self.scene.notes.push(format!(
-                "line {line}: the reference {file:?} is not followed; import it into the scene in Maya"
-            ));
+            let note = "references that are not followed (import them into the scene in Maya)";
+            self.scene.notes.about(note, format!("line {line}: {file:?}"));
         }
         self.lexer.skip_statement()
     }
@@ -346,6 +441,17 @@ impl<'a> Parser<'a> {
             None => return self.lexer.skip_statement(),
         };
         let Some(id) = node else { return self.lexer.skip_statement() };
+        match path {
+            "nds" | "nodeState" if self.has_value()? => {
+                self.scene.nodes[id].state = self.count("node state")?;
+                return self.lexer.skip_statement();
+            }
+            "en" | "envelope" if self.has_value()? => {
+                self.scene.nodes[id].envelope = self.needed()?;
+                return self.lexer.skip_statement();
+            }
+            _ => {}
+        }
         // Taken out while it is filled, so that the parser can be used meanwhile.
         let mut data = std::mem::replace(&mut self.scene.nodes[id].data, Data::Other);
         let result = match &mut data {
@@ -360,16 +466,21 @@ impl<'a> Parser<'a> {
         self.lexer.skip_statement()
     }
 
-    fn fill(&mut self, data: &mut Data, attribute: &Attribute<'_>, line: usize) -> Result<(), Fault> {
+    /// False for `setAttr -l on ".tx";` and `setAttr -s 8 ".vt";`, which set no value.
+    fn has_value(&mut self) -> Result<bool, Fault> {
         self.lexer.skip_type()?;
-        if self.lexer.at_end()? {
-            // `setAttr -l on ".tx";` and `setAttr -s 8 ".vt";` set no value.
+        Ok(!self.lexer.at_end()?)
+    }
+
+    fn fill(&mut self, data: &mut Data, attribute: &Attribute<'_>, line: usize) -> Result<(), Fault> {
+        if !self.has_value()? {
             return Ok(());
         }
         match data {
             Data::Transform(transform) => self.fill_transform(transform, &attribute.key()),
             Data::Mesh(mesh) => self.fill_mesh(mesh, attribute, line),
             Data::BlendShape(shape) => self.fill_blend_shape(shape, attribute, line),
+            Data::Tweak(tweak) => self.fill_tweak(tweak, attribute),
             Data::Curve(curve) => self.fill_curve(curve, attribute),
             Data::PolyCube(cube) => {
                 let metres = self.scene.metres;
@@ -421,6 +532,18 @@ impl<'a> Parser<'a> {
             "spt" => transform.scale_pivot_translate_cm = scaled(self.triple()?, length),
             "jo" => transform.joint_orient = scaled(self.triple()?, angle),
             "ra" => transform.rotate_axis = scaled(self.triple()?, angle),
+            "sh" => transform.shear = self.triple()?,
+            "shxy" | "sh.shxy" => transform.shear[0] = self.needed()?,
+            "shxz" | "sh.shxz" => transform.shear[1] = self.needed()?,
+            "shyz" | "sh.shyz" => transform.shear[2] = self.needed()?,
+            "opm" => {
+                let mut matrix = [0.0; 16];
+                for value in &mut matrix {
+                    *value = self.needed()?;
+                }
+                transform.offset_parent = Some(matrix);
+            }
+            "it" => transform.inherits = self.flag_on()?,
             "v" => transform.visible = self.visibility()?,
             "rfa" => transform.facial_appearance = self.text()?,
             _ => {}
@@ -458,6 +581,10 @@ impl<'a> Parser<'a> {
                     index = index.saturating_add(1);
                 }
             }
+            "pt.px" | "pt.py" | "pt.pz" => {
+                let from = attribute.index(attribute.steps.len() - 2);
+                self.components_of(&mut mesh.tweaks, from, axis(attribute))?;
+            }
             "ed" => {
                 let Some((from, _)) = range else { return Ok(()) };
                 self.expect_end_of(from, mesh.edges.len(), ".ed", line)?;
@@ -488,12 +615,68 @@ impl<'a> Parser<'a> {
             "cuvs" => mesh.current_uv_set = self.text()?,
             "io" => mesh.intermediate = self.flag_on()?,
             "v" => mesh.hidden = !self.visibility()?,
+            "op" => mesh.opposite = self.flag_on()?,
             "iog.og.gcl" => {
-                let group = attribute.index(1);
+                let group = (attribute.index(0), attribute.index(1));
                 let (ranges, _) = self.components("f", line)?;
                 mesh.face_groups.insert(group, ranges);
             }
             _ => {}
+        }
+        Ok(())
+    }
+
+    fn fill_tweak(&mut self, tweak: &mut TweakData, attribute: &Attribute<'_>) -> Result<(), Fault> {
+        let metres = self.scene.metres;
+        match attribute.key().as_str() {
+            "vl.vt" | "pl.cp" => {
+                let moves = tweak.moves.entry(attribute.index(0)).or_default();
+                let mut index = attribute.index(1);
+                while let Some(offset) = self.next_triple()? {
+                    moves.insert(index, offset.map(|c| (c * metres) as f32));
+                    index = index.saturating_add(1);
+                }
+            }
+            "vl.vt.px" | "vl.vt.py" | "vl.vt.pz" | "pl.cp.px" | "pl.cp.py" | "pl.cp.pz" => {
+                let moves = tweak.moves.entry(attribute.index(0)).or_default();
+                self.components_of(moves, attribute.index(1), axis(attribute))?;
+            }
+            "rtw" => tweak.relative = self.flag_on()?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// One coordinate of points from an index on.
+    fn components_of(
+        &mut self,
+        moves: &mut std::collections::BTreeMap<u32, [f32; 3]>,
+        from: u32,
+        axis: usize,
+    ) -> Result<(), Fault> {
+        let mut index = from;
+        while let Some(value) = self.number()? {
+            moves.entry(index).or_default()[axis] = (value * self.scene.metres) as f32;
+            index = index.saturating_add(1);
+        }
+        Ok(())
+    }
+
+    /// The numbers that are left of the statement.
+    fn numbers(&mut self) -> Result<Vec<f64>, Fault> {
+        let mut numbers = Vec::new();
+        while let Some(number) = self.number()? {
+            numbers.push(number);
+        }
+        Ok(numbers)
+    }
+
+    /// `yes no yes` from an index on.
+    fn flags(&mut self, into: &mut std::collections::BTreeMap<u32, bool>, from: u32) -> Result<(), Fault> {
+        let mut index = from;
+        while !self.lexer.at_end()? {
+            into.insert(index, self.flag_on()?);
+            index = index.saturating_add(1);
         }
         Ok(())
     }
@@ -631,6 +814,40 @@ impl<'a> Parser<'a> {
                 let (points, _) = self.components("vtx", line)?;
                 shape.items.entry(key).or_default().points = points;
             }
+            "it.bw" => {
+                let values = self.numbers()?.into_iter().map(|v| v as f32).collect();
+                let painted = shape.base_weights.entry(attribute.index(0)).or_default();
+                painted.blocks.push((attribute.index(1), values));
+            }
+            "it.itg.tw" => {
+                let values = self.numbers()?.into_iter().map(|v| v as f32).collect();
+                let key = (attribute.index(0), attribute.index(1));
+                let painted = shape.target_weights.entry(key).or_default();
+                painted.blocks.push((attribute.index(2), values));
+            }
+            "it.itg.pdm" => {
+                if self.count("mode")? > 0 {
+                    shape.post_deformed.push(attribute.index(1));
+                }
+            }
+            "tgvs" => self.flags(&mut shape.visible, attribute.index(0))?,
+            "tpvs" => self.flags(&mut shape.parent_visible, attribute.index(0))?,
+            "pndr" => {
+                for (index, group) in (attribute.index(0)..).zip(self.numbers()?) {
+                    shape.group_of.insert(index, group.clamp(0.0, 1e9) as u32);
+                }
+            }
+            "tgdt.pnid" => {
+                let group = self.count("group")?;
+                shape.group_parents.insert(attribute.index(0), group);
+            }
+            "tgdt.dwgh" => {
+                shape.group_weights.insert(attribute.index(0), self.needed()?);
+            }
+            "ibig.ibi.ibvs" => {
+                let shown = self.flag_on()?;
+                shape.hidden_items.insert((attribute.index(0), attribute.index(1)), !shown);
+            }
             "ibig.ibi.ibtn" => {
                 if let Some(name) = self.text()? {
                     shape.item_names.insert((attribute.index(0), attribute.index(1)), name);
@@ -695,6 +912,15 @@ impl<'a> Parser<'a> {
     }
 }
 
+/// 0, 1 or 2 for an attribute that ends in `.px`, `.py` or `.pz`.
+fn axis(attribute: &Attribute<'_>) -> usize {
+    match short(attribute.last().0) {
+        "py" => 1,
+        "pz" => 2,
+        _ => 0,
+    }
+}
+
 fn whole(value: f64, line: usize) -> Result<u32, Fault> {
     if value >= 0.0 && value <= LARGEST_INDEX as f64 && value.fract() == 0.0 {
         return Ok(value as u32);
@@ -735,7 +961,8 @@ mod tests {
     #[test]
     fn what_a_scene_requires_is_named() {
         let scene = parse(b"requires maya \"2024\";\nrequires -nodeType \"x\" \"mtoa\" \"5.3\";\nrequires \"faceware\" \"1\";\nfile -r -ns \"a\" -typ \"mayaAscii\" \"C:/a.ma\";").unwrap();
-        assert_eq!(scene.notes.len(), 2, "{:?}", scene.notes);
-        assert!(scene.notes[0].contains("faceware 1") && scene.notes[1].contains("C:/a.ma"));
+        let notes = scene.notes.lines();
+        assert_eq!(notes.len(), 2, "{notes:?}");
+        assert!(notes[0].contains("faceware 1") && notes[1].contains("C:/a.ma"));
     }
 }

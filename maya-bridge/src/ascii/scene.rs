@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use crate::notes::Notes;
+
 /// Index of a node.
 pub(crate) type NodeId = usize;
 
@@ -12,8 +14,23 @@ pub(crate) struct Node {
     pub(crate) kind: String,
     pub(crate) name: String,
     pub(crate) parent: Option<NodeId>,
+    /// Further parents of an instance (`parent -add`).
+    pub(crate) other_parents: Vec<NodeId>,
+    /// Nodes above it.
+    pub(crate) depth: usize,
     pub(crate) line: usize,
+    /// `nodeState`: 0 normal, 1 has no effect, 2 blocking, 3 to 5 the same while waiting.
+    pub(crate) state: u32,
+    /// How much of its effect a deformer has.
+    pub(crate) envelope: f64,
     pub(crate) data: Data,
+}
+
+impl Node {
+    /// True if the node state lets the geometry through unchanged.
+    pub(crate) fn is_off(&self) -> bool {
+        matches!(self.state, 1 | 2 | 4 | 5)
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -21,6 +38,7 @@ pub(crate) enum Data {
     Transform(Box<Transform>),
     Mesh(Box<MeshData>),
     BlendShape(Box<BlendShapeData>),
+    Tweak(Box<TweakData>),
     Curve(Box<CurveData>),
     PolyCube(PolyCube),
     /// Body of a script node.
@@ -43,6 +61,11 @@ pub(crate) struct Transform {
     /// Orientation of a joint.
     pub(crate) joint_orient: [f64; 3],
     pub(crate) rotate_axis: [f64; 3],
+    /// xy, xz, yz.
+    pub(crate) shear: [f64; 3],
+    /// Rows of `offsetParentMatrix`, centimetres in the last.
+    pub(crate) offset_parent: Option<[f64; 16]>,
+    pub(crate) inherits: bool,
     pub(crate) visible: bool,
     /// What this crate writes about a head.
     pub(crate) facial_appearance: Option<String>,
@@ -62,6 +85,9 @@ impl Default for Transform {
             scale_pivot_translate_cm: zero,
             joint_orient: zero,
             rotate_axis: zero,
+            shear: zero,
+            offset_parent: None,
+            inherits: true,
             visible: true,
             facial_appearance: None,
         }
@@ -85,9 +111,44 @@ pub(crate) struct MeshData {
     pub(crate) current_uv_set: Option<String>,
     pub(crate) intermediate: bool,
     pub(crate) hidden: bool,
+    /// Normals point to the other side: what freezing a negative scale leaves behind.
+    pub(crate) opposite: bool,
     pub(crate) holes: usize,
-    /// Face ranges of the object groups `iog[0].og[n]`.
-    pub(crate) face_groups: BTreeMap<u32, Vec<[u32; 2]>>,
+    /// Face ranges of the object groups `iog[instance].og[n]`.
+    pub(crate) face_groups: BTreeMap<(u32, u32), Vec<[u32; 2]>>,
+}
+
+/// What a `tweak` node moves, by geometry and point, metres.
+#[derive(Clone, Debug)]
+pub(crate) struct TweakData {
+    pub(crate) moves: BTreeMap<u32, BTreeMap<u32, [f32; 3]>>,
+    /// False: the values are places, not moves.
+    pub(crate) relative: bool,
+}
+
+impl Default for TweakData {
+    fn default() -> Self {
+        Self { moves: BTreeMap::new(), relative: true }
+    }
+}
+
+/// Painted weights of points: 1 where nothing was painted.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Painted {
+    /// First point and weights of each written block.
+    pub(crate) blocks: Vec<(u32, Vec<f32>)>,
+}
+
+impl Painted {
+    /// A weight for each of `count` points; none where all are 1.
+    pub(crate) fn dense(&self, count: usize) -> Option<Vec<f32>> {
+        let mut weights = vec![1.0; count];
+        for (start, values) in &self.blocks {
+            let to = weights.iter_mut().skip(*start as usize);
+            to.zip(values).for_each(|(weight, value)| *weight = *value);
+        }
+        weights.iter().any(|w| *w != 1.0).then_some(weights)
+    }
 }
 
 #[derive(Clone, Debug, Default)]
@@ -105,6 +166,21 @@ pub(crate) struct BlendShapeData {
     pub(crate) items: BTreeMap<(u32, u32, u32), Item>,
     /// Name of each in-between, by target and item.
     pub(crate) item_names: BTreeMap<(u32, u32), String>,
+    /// In-betweens that the shape editor hides, by target and item.
+    pub(crate) hidden_items: BTreeMap<(u32, u32), bool>,
+    /// Painted weights of all targets, by geometry.
+    pub(crate) base_weights: BTreeMap<u32, Painted>,
+    /// Painted weights by geometry and target.
+    pub(crate) target_weights: BTreeMap<(u32, u32), Painted>,
+    /// False where the shape editor hides a target (`targetVisibility`) or its group (`targetParentVisibility`).
+    pub(crate) visible: BTreeMap<u32, bool>,
+    pub(crate) parent_visible: BTreeMap<u32, bool>,
+    /// Group of each target, group of each group, weight of each group.
+    pub(crate) group_of: BTreeMap<u32, u32>,
+    pub(crate) group_parents: BTreeMap<u32, u32>,
+    pub(crate) group_weights: BTreeMap<u32, f64>,
+    /// Targets whose offsets follow the surface or a transform (`postDeformersMode`).
+    pub(crate) post_deformed: Vec<u32>,
 }
 
 /// Stored offsets of a target.
@@ -118,7 +194,7 @@ pub(crate) struct Item {
 }
 
 /// Keys as written: times in the scene's unit, values in its units of length and angle.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CurveData {
     pub(crate) keys: BTreeMap<u32, [f64; 2]>,
     pub(crate) default_tangent: u32,
@@ -179,7 +255,9 @@ pub(crate) struct Scene {
     pub(crate) connections: Vec<(Plug, Plug)>,
     by_destination: HashMap<(NodeId, String), usize>,
     by_source: HashMap<NodeId, Vec<usize>>,
+    into: HashMap<NodeId, Vec<usize>>,
     by_name: HashMap<String, Vec<NodeId>>,
+    by_parent: HashMap<(Option<NodeId>, String), NodeId>,
     /// Frames (units of time) in a second.
     pub(crate) fps: f64,
     /// Metres in a unit of length.
@@ -187,7 +265,7 @@ pub(crate) struct Scene {
     /// Radians in a unit of angle.
     pub(crate) radians: f64,
     /// Plugins that the scene needs, and other files that it refers to.
-    pub(crate) notes: Vec<String>,
+    pub(crate) notes: Notes,
 }
 
 impl Default for Scene {
@@ -197,11 +275,13 @@ impl Default for Scene {
             connections: Vec::new(),
             by_destination: HashMap::new(),
             by_source: HashMap::new(),
+            into: HashMap::new(),
             by_name: HashMap::new(),
+            by_parent: HashMap::new(),
             fps: 24.0,
             metres: 0.01,
             radians: std::f64::consts::PI / 180.0,
-            notes: Vec::new(),
+            notes: Notes::default(),
         }
     }
 }
@@ -209,19 +289,38 @@ impl Default for Scene {
 impl Scene {
     pub(crate) fn add(&mut self, node: Node) -> NodeId {
         self.by_name.entry(node.name.clone()).or_default().push(self.nodes.len());
+        self.by_parent.entry((node.parent, node.name.clone())).or_insert(self.nodes.len());
         self.nodes.push(node);
         self.nodes.len() - 1
+    }
+
+    /// Puts a node below a further parent; paths find it there too.
+    pub(crate) fn add_instance(&mut self, node: NodeId, parent: NodeId) {
+        let name = self.nodes[node].name.clone();
+        self.by_parent.entry((Some(parent), name)).or_insert(node);
+        self.nodes[node].other_parents.push(parent);
     }
 
     pub(crate) fn connect(&mut self, from: Plug, to: Plug) {
         let index = self.connections.len();
         self.by_destination.insert((to.node, to.attribute.clone()), index);
         self.by_source.entry(from.node).or_default().push(index);
+        self.into.entry(to.node).or_default().push(index);
         self.connections.push((from, to));
     }
 
     /// The node of a path: `|group|head|headShape`, `head|headShape`, `headShape`, `:time1`.
     pub(crate) fn find(&self, path: &str) -> Option<NodeId> {
+        if let Some(full) = path.strip_prefix('|') {
+            let mut at = None;
+            let found = full.split('|').all(|name| {
+                at = self.by_parent.get(&(at, name.to_owned())).copied();
+                at.is_some()
+            });
+            if found {
+                return at;
+            }
+        }
         let mut parts = path.trim_start_matches([':', '|']).rsplit('|');
         let leaf = parts.next()?;
         let candidates = self.by_name.get(leaf)?;
@@ -246,6 +345,11 @@ impl Scene {
     /// What a node is connected to.
     pub(crate) fn outputs(&self, node: NodeId) -> impl Iterator<Item = &(Plug, Plug)> {
         self.by_source.get(&node).into_iter().flatten().map(|i| &self.connections[*i])
+    }
+
+    /// What is connected into a node.
+    pub(crate) fn inputs(&self, node: NodeId) -> impl Iterator<Item = &(Plug, Plug)> {
+        self.into.get(&node).into_iter().flatten().map(|i| &self.connections[*i])
     }
 
     /// `|group|head|headShape`. A parent always stands before its child, so this ends.

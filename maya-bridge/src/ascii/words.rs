@@ -1,7 +1,7 @@
 //! What single words of a scene mean: numbers, units, attribute names.
 
 /// Short name of an attribute that scenes also write long.
-pub(super) fn short(name: &str) -> &str {
+pub(crate) fn short(name: &str) -> &str {
     match name {
         "vrts" => "vt",
         "edge" => "ed",
@@ -32,6 +32,32 @@ pub(super) fn short(name: &str) -> &str {
         "scalePivotTranslate" => "spt",
         "jointOrient" => "jo",
         "rotateAxis" => "ra",
+        "shear" => "sh",
+        "shearXY" => "shxy",
+        "shearXZ" => "shxz",
+        "shearYZ" => "shyz",
+        "offsetParentMatrix" => "opm",
+        "inheritsTransform" => "it",
+        "opposite" => "op",
+        "pntx" | "xv" | "xValue" | "xVertex" | "vx" | "vrtx" => "px",
+        "pnty" | "yv" | "yValue" | "yVertex" | "vy" | "vrty" => "py",
+        "pntz" | "zv" | "zValue" | "zVertex" | "vz" | "vrtz" => "pz",
+        "vlist" => "vl",
+        "vertex" => "vt",
+        "plist" => "pl",
+        "controlPoints" => "cp",
+        "relativeTweak" => "rtw",
+        "tweakLocation" => "twl",
+        "baseWeights" => "bw",
+        "targetWeights" => "tw",
+        "targetVisibility" => "tgvs",
+        "targetParentVisibility" => "tpvs",
+        "targetDirectory" => "tgdt",
+        "directoryWeight" => "dwgh",
+        "parentDirectory" => "pndr",
+        "parentIndex" => "pnid",
+        "postDeformersMode" => "pdm",
+        "inbetweenVisibility" => "ibvs",
         "weight" => "w",
         "envelope" => "en",
         "inputTarget" => "it",

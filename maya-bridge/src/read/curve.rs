@@ -32,6 +32,9 @@ struct Tangent {
     y: f64,
 }
 
+/// Most frames that the curves of a scene are sampled at: 52 weights for 26 minutes at 60 a second.
+pub(super) const MOST_BAKED_FRAMES: f64 = 5_000_000.0;
+
 const FIXED: u32 = 1;
 const LINEAR: u32 = 2;
 const FLAT: u32 = 3;
@@ -41,6 +44,35 @@ const CLAMPED: u32 = 10;
 const PLATEAU: u32 = 16;
 const STEP_NEXT: u32 = 17;
 const AUTO: u32 = 18;
+
+/// Segments that no easing says and that are sampled at frames, up to a limit for a scene.
+#[derive(Debug)]
+pub(super) struct Baking {
+    frames_left: f64,
+    pub(super) segments: usize,
+    /// Segments that would go over the limit and are straight instead.
+    pub(super) too_long: usize,
+}
+
+impl Default for Baking {
+    fn default() -> Self {
+        Self { frames_left: MOST_BAKED_FRAMES, segments: 0, too_long: 0 }
+    }
+}
+
+impl Baking {
+    /// True if a segment of so many frames is to be sampled.
+    pub(super) fn segment(&mut self, frames: f64) -> bool {
+        let fits = frames <= self.frames_left;
+        if fits {
+            self.frames_left -= frames;
+            self.segments += 1;
+        } else {
+            self.too_long += 1;
+        }
+        fits
+    }
+}
 
 impl Curve {
     /// `fps`: units of time in a second. `unit`: what the written values are multiplied by; stored tangents are in
@@ -68,6 +100,10 @@ impl Curve {
 
     pub(super) fn first_s(&self) -> f64 {
         self.keys[0].time_s
+    }
+
+    pub(super) fn times_s(&self) -> impl Iterator<Item = f64> {
+        self.keys.iter().map(|k| k.time_s)
     }
 
     pub(super) fn last_s(&self) -> f64 {
@@ -180,29 +216,36 @@ impl Curve {
     }
 
     /// The curve as a track: key by key where an easing says the same, frame by frame elsewhere. `value` turns values
-    /// into what the track holds. The second result is the number of segments that were baked.
-    pub(super) fn track(&self, start_s: f64, fps: f64, value: impl Fn(f64) -> f32) -> (Track<f32>, usize) {
+    /// into what the track holds.
+    pub(super) fn track(
+        &self,
+        start_s: f64,
+        fps: f64,
+        baking: &mut Baking,
+        value: impl Fn(f64) -> f32,
+    ) -> Track<f32> {
         let mut keys: Vec<Key<f32>> = Vec::new();
-        let mut baked = 0;
         for (i, knot) in self.keys.iter().enumerate() {
             let ease = if i + 1 < self.keys.len() { self.ease(i) } else { Some(Ease::Linear) };
             // Exact where the scene starts at 0.
             let t = (knot.time_s - start_s).max(0.0);
             keys.push(Key { t, v: value(knot.value), ease: ease.unwrap_or_default() });
             if ease.is_none() {
-                baked += 1;
                 let end = self.keys[i + 1].time_s - start_s;
+                if !baking.segment((end - t) * fps) {
+                    continue;
+                }
                 let first = (t * fps + 1e-6).floor() as u64 + 1;
                 for frame in first.. {
                     let time = frame as f64 / fps;
-                    if time >= end - 1e-9 || frame - first > 1_000_000 {
+                    if time >= end - 1e-9 {
                         break;
                     }
                     keys.push(Key { t: time, v: value(self.at(time + start_s)), ease: Ease::Linear });
                 }
             }
         }
-        (Track::Keys(keys), baked)
+        Track::Keys(keys)
     }
 
     /// The easing of a segment, where one is the same curve.
@@ -284,6 +327,17 @@ mod tests {
     }
 
     #[test]
+    fn keys_years_apart_are_not_sampled_at_frames() {
+        let c = curve(&[[0.0, 0.0], [7.0, 0.3], [1e12, 1.0], [2e12, 3.0]], SPLINE);
+        let mut baking = Baking::default();
+        let Track::Keys(keys) = c.track(0.0, 24.0, &mut baking, |v| v as f32) else {
+            panic!("keys expected")
+        };
+        assert_eq!((baking.segments, baking.too_long), (1, 2));
+        assert_eq!(keys.len(), 4 + 6);
+    }
+
+    #[test]
     fn weighted_handles_bend_time() {
         let mut data = CurveData { weighted: true, default_tangent: FIXED, ..CurveData::default() };
         data.keys = [(0, [0.0, 0.0]), (1, [24.0, 1.0])].into();
@@ -310,8 +364,10 @@ mod tests {
         let keys = [[0.0, 0.0], [7.0, 0.3], [20.0, 1.0], [21.0, 1.0], [40.0, 0.2]];
         for tangent in [LINEAR, FLAT, STEP, SPLINE, CLAMPED, PLATEAU, STEP_NEXT, AUTO] {
             let c = curve(&keys, tangent);
-            let (track, baked) = c.track(0.0, 24.0, |v| v as f32);
-            assert_eq!(baked == 0, [LINEAR, FLAT, STEP].contains(&tangent), "tangent {tangent}: {baked}");
+            let mut baking = Baking::default();
+            let track = c.track(0.0, 24.0, &mut baking, |v| v as f32);
+            let exact = [LINEAR, FLAT, STEP].contains(&tangent);
+            assert_eq!(baking.segments == 0, exact, "tangent {tangent}: {baking:?}");
             for frame in 0..45 {
                 let t = f64::from(frame) / 24.0;
                 assert!((f64::from(track.at(t)) - c.at(t)).abs() < 1e-6, "tangent {tangent}, frame {frame}");

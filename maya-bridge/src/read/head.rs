@@ -5,44 +5,56 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use rubor_assets::import::materials::guess_material;
+use rubor_assets::poly::triangulate;
 use rubor_rig::expression::Inbetween;
 use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange, Part, Vertex};
 
 use super::Options;
-use super::geometry::{Polygons, history, points, polygons, world_matrix};
+use super::geometry::{Instance, Polygons, history, instances, points, polygons, world_matrix};
+use super::weight::{Effect, effect, tell};
 use crate::appearance::Appearance;
 use crate::ascii::scene::{BlendShapeData, Data, Item, NodeId, Scene};
 use crate::error::Fault;
+use crate::notes::Notes;
 use crate::plain_name;
 
+/// Most points of a head, all instances counted.
+const MOST_POINTS: usize = 50_000_000;
+
+/// A weight of a blend shape node, and the shape that it drives.
+pub(super) struct Weight<'s> {
+    pub(super) node: NodeId,
+    pub(super) shape: String,
+    pub(super) effect: Effect<'s>,
+}
+
 /// A head and where its numbers come from.
-pub(super) struct Built {
+pub(super) struct Built<'s> {
     pub(super) head: Head,
     pub(super) inbetweens: Vec<Inbetween>,
-    /// Blend shape node and index of each weight, with the shape that it drives.
-    pub(super) weights: Vec<(NodeId, u32, String)>,
-    pub(super) meshes: Vec<NodeId>,
+    pub(super) weights: Vec<Weight<'s>>,
+    pub(super) instances: Vec<Instance>,
     /// The rig file that this crate wrote.
     pub(super) rig: Option<serde_json::Value>,
     /// Transform that carries what this crate wrote: it is the motion of the head, not its place.
     pub(super) carrier: Option<NodeId>,
 }
 
-pub(super) fn build(
-    scene: &Scene,
+pub(super) fn build<'s>(
+    scene: &'s Scene,
     options: &Options,
     name: &str,
     folder: &Path,
-    notes: &mut Vec<String>,
-) -> Result<Built, Fault> {
-    let meshes = chosen(scene, options)?;
-    let carriers: Vec<NodeId> = meshes.iter().filter_map(|m| carrier_of(scene, *m)).collect();
+    notes: &mut Notes,
+) -> Result<Built<'s>, Fault> {
+    let chosen = chosen(scene, options)?;
+    let carriers: Vec<NodeId> = chosen.iter().filter_map(|i| carrier_of(scene, i)).collect();
     let carrier = carriers.first().copied().filter(|c| carriers.iter().all(|o| o == c));
     let written = carrier.and_then(|id| scene.transform(id)).and_then(|t| t.facial_appearance.as_deref());
     let appearance = match written.map(Appearance::parse) {
         Some(Ok(appearance)) => Some(appearance),
         Some(Err(reason)) => {
-            notes.push(format!("the attribute ruborFacialAppearance was left out: {reason}"));
+            notes.say(format!("the attribute ruborFacialAppearance was left out: {reason}"));
             None
         }
         None => None,
@@ -56,17 +68,22 @@ pub(super) fn build(
         head: Head::default(),
         inbetweens: Vec::new(),
         weights: Vec::new(),
+        index_of_weight: HashMap::new(),
+        driven: HashMap::new(),
+        between: HashMap::new(),
+        told: HashSet::new(),
     };
     assembly.head.name = name.to_owned();
     let mut first_fault = None;
     let mut read = Vec::new();
-    for mesh in &meshes {
-        match assembly.add(*mesh, carrier, notes) {
-            Ok(()) => read.push(*mesh),
+    let several = chosen.len() > 1;
+    for instance in chosen {
+        match assembly.add(&instance, carrier, notes) {
+            Ok(()) => read.push(instance),
             Err(fault) => {
-                if meshes.len() > 1 {
-                    let path = scene.path(*mesh);
-                    notes.push(format!("line {}: {path} was left out: found {}", fault.line, fault.found));
+                if several {
+                    let name = format!("{} (line {}: {})", instance.path(scene), fault.line, fault.found);
+                    notes.about("meshes that cannot be read were left out", name);
                 }
                 first_fault.get_or_insert(fault);
             }
@@ -79,35 +96,32 @@ pub(super) fn build(
 }
 
 /// The nearest ancestor that carries our attribute.
-fn carrier_of(scene: &Scene, mesh: NodeId) -> Option<NodeId> {
-    let mut at = scene.nodes[mesh].parent;
-    while let Some(id) = at {
-        if scene.transform(id).is_some_and(|t| t.facial_appearance.is_some()) {
-            return Some(id);
-        }
-        at = scene.nodes[id].parent;
-    }
-    None
+fn carrier_of(scene: &Scene, instance: &Instance) -> Option<NodeId> {
+    let carries = |id: &&NodeId| scene.transform(**id).is_some_and(|t| t.facial_appearance.is_some());
+    instance.above.iter().find(carries).copied()
 }
 
-/// Meshes that the options ask for; otherwise visible ones that are no targets.
-fn chosen(scene: &Scene, options: &Options) -> Result<Vec<NodeId>, Fault> {
+/// Meshes that the options ask for, in all their places; otherwise visible ones that are no targets.
+fn chosen(scene: &Scene, options: &Options) -> Result<Vec<Instance>, Fault> {
     let targets: HashSet<NodeId> = (scene.connections.iter())
         .filter(|(_, to)| to.attribute.ends_with(".igt"))
         .map(|(from, _)| from.node)
         .collect();
-    let is_mesh = |id: &NodeId| scene.mesh(*id).is_some_and(|m| !m.intermediate);
-    let all: Vec<NodeId> = (0..scene.nodes.len()).filter(is_mesh).collect();
-    let chosen: Vec<NodeId> = match &options.mesh {
-        Some(part) => all.iter().copied().filter(|id| scene.path(*id).contains(part.as_str())).collect(),
-        None => all.iter().copied().filter(|id| !targets.contains(id) && is_visible(scene, *id)).collect(),
+    let mut all = Vec::new();
+    for id in (0..scene.nodes.len()).filter(|id| scene.mesh(*id).is_some_and(|m| !m.intermediate)) {
+        all.extend(instances(scene, id)?);
+    }
+    let wanted = |instance: &&Instance| match &options.mesh {
+        Some(part) => instance.path(scene).contains(part.as_str()),
+        None => !targets.contains(&instance.mesh) && is_visible(scene, instance),
     };
+    let chosen: Vec<Instance> = all.iter().filter(wanted).cloned().collect();
     if chosen.is_empty() {
         let found = match &options.mesh {
             Some(part) => format!("no mesh whose path contains {part:?}"),
             None => "no visible mesh".to_owned(),
         };
-        let paths: Vec<String> = all.iter().take(8).map(|id| scene.path(*id)).collect();
+        let paths: Vec<String> = all.iter().take(8).map(|instance| instance.path(scene)).collect();
         let expected = match paths.len() {
             0 => "a mesh".to_owned(),
             _ => format!("one of {}", paths.join(", ")),
@@ -117,14 +131,9 @@ fn chosen(scene: &Scene, options: &Options) -> Result<Vec<NodeId>, Fault> {
     Ok(chosen)
 }
 
-fn is_visible(scene: &Scene, mesh: NodeId) -> bool {
-    let mut at = scene.nodes[mesh].parent;
-    let mut visible = scene.mesh(mesh).is_some_and(|m| !m.hidden);
-    while let Some(id) = at {
-        visible &= scene.transform(id).is_none_or(|t| t.visible);
-        at = scene.nodes[id].parent;
-    }
-    visible
+fn is_visible(scene: &Scene, instance: &Instance) -> bool {
+    scene.mesh(instance.mesh).is_some_and(|m| !m.hidden)
+        && instance.above.iter().all(|id| scene.transform(*id).is_none_or(|t| t.visible))
 }
 
 struct Assembly<'s> {
@@ -135,41 +144,55 @@ struct Assembly<'s> {
     by_name: HashMap<String, usize>,
     head: Head,
     inbetweens: Vec<Inbetween>,
-    weights: Vec<(NodeId, u32, String)>,
+    weights: Vec<Weight<'s>>,
+    /// Place in `weights` of a weight of a node.
+    index_of_weight: HashMap<(NodeId, u32), usize>,
+    /// Shapes that a weight drives, with its place in `weights`.
+    driven: HashMap<String, usize>,
+    /// Shapes that are in-betweens, with the shape that they are on the way to.
+    between: HashMap<String, String>,
+    /// Blend shapes whose peculiarities are in the notes.
+    told: HashSet<NodeId>,
 }
 
-impl Assembly<'_> {
-    fn add(&mut self, mesh: NodeId, carrier: Option<NodeId>, notes: &mut Vec<String>) -> Result<(), Fault> {
+impl<'s> Assembly<'s> {
+    fn add(&mut self, instance: &Instance, carrier: Option<NodeId>, notes: &mut Notes) -> Result<(), Fault> {
         let scene = self.scene;
+        let mesh = instance.mesh;
         let history = history(scene, mesh);
         let Some(base) = history.base else {
             let found = format!("{} with a history that runs in a circle", scene.path(mesh));
             return Err(Fault::new(scene.nodes[mesh].line, found, "a mesh with a beginning"));
         };
-        let polygons = polygons(scene, base)?;
+        let polygons = polygons(scene, &history, notes)?;
         if polygons.faces.is_empty() {
             let found = format!("{} without faces", scene.path(base));
             return Err(Fault::new(scene.nodes[base].line, found, "a mesh with faces"));
         }
         for id in &history.ignored {
             let node = &scene.nodes[*id];
-            notes.push(format!(
-                "line {}: {} of {} is ignored: {} is no blendShape",
-                node.line,
-                node.name,
-                scene.path(mesh),
-                node.kind
-            ));
+            notes.about(
+                format!("{} nodes are not evaluated", node.kind),
+                format!("{} of {} (line {})", node.name, scene.path(mesh), node.line),
+            );
         }
         if scene.mesh(base).is_some_and(|m| m.holes > 0) {
-            notes.push(format!("{}: holes in faces are filled", scene.path(base)));
+            notes.about("holes in faces are filled", scene.path(base));
+        }
+        let total = self.head.mesh.points.len() + polygons.points.len();
+        if total > MOST_POINTS {
+            let found = format!("{total} points with {}", instance.path(scene));
+            return Err(Fault::new(scene.nodes[mesh].line, found, format!("at most {MOST_POINTS}")));
         }
         // The carrier is the head's motion; what stands above and below it is its place.
         let identity = |id: NodeId| (Some(id) == carrier).then_some(DAffine3::IDENTITY);
-        let place = world_matrix(scene, mesh, &identity);
+        let place = world_matrix(scene, instance, &identity);
         let first_point = self.head.mesh.points.len() as u32;
         self.head.mesh.points.extend(polygons.points.iter().map(|p| placed(&place, *p)));
-        self.faces(mesh, &polygons, first_point);
+        // A mirror turns triangles inside out.
+        let mirrored = place.matrix3.determinant() < 0.0;
+        let turned = mirrored != scene.mesh(mesh).is_some_and(|m| m.opposite);
+        self.faces(instance, &polygons, first_point, turned);
         for (node, geometry) in history.blend_shapes.iter().rev() {
             if let Data::BlendShape(data) = &scene.nodes[*node].data {
                 self.targets(*node, data, *geometry, &polygons, &place, first_point, notes)?;
@@ -179,8 +202,8 @@ impl Assembly<'_> {
     }
 
     /// Triangles by object group; vertices in the order of their texture coordinates.
-    fn faces(&mut self, mesh: NodeId, polygons: &Polygons, first_point: u32) {
-        let groups = self.groups(mesh, polygons.faces.len());
+    fn faces(&mut self, instance: &Instance, polygons: &Polygons, first_point: u32, turned: bool) {
+        let groups = self.groups(instance, polygons.faces.len());
         let mut pairs: Vec<(u32, u32)> = polygons.faces.iter().flatten().map(|[p, uv]| (*uv, *p)).collect();
         pairs.sort_unstable();
         pairs.dedup();
@@ -194,16 +217,15 @@ impl Assembly<'_> {
             // Every pair was put in above.
             first_vertex + pairs.binary_search(&(uv, point)).unwrap_or_default() as u32
         };
-        let at = |corner: [u32; 2]| Vec3::from(polygons.points[corner[0] as usize]);
         for (name, material, faces) in groups {
             let start = self.head.mesh.triangles.len() as u32;
-            for face in faces.into_iter().map(|f| &polygons.faces[f as usize]).filter(|f| f.len() >= 3) {
-                let shorter = face.len() == 4
-                    && at(face[1]).distance_squared(at(face[3])) < at(face[0]).distance_squared(at(face[2]));
-                let first = usize::from(shorter);
-                let corner = |k: usize| vertex(face[(k + first) % face.len()]);
-                let fan = (2..face.len()).map(|k| [corner(0), corner(k - 1), corner(k)]);
-                self.head.mesh.triangles.extend(fan);
+            for face in faces.into_iter().map(|f| &polygons.faces[f as usize]) {
+                let border: Vec<Vec3> =
+                    face.iter().map(|[point, _]| Vec3::from(polygons.points[*point as usize])).collect();
+                for triangle in triangulate(&border) {
+                    let [a, b, c] = triangle.map(|corner| vertex(face[corner as usize]));
+                    self.head.mesh.triangles.push(if turned { [a, c, b] } else { [a, b, c] });
+                }
             }
             let end = self.head.mesh.triangles.len() as u32;
             self.head.mesh.parts.push(Part { name, material, triangles: start..end });
@@ -211,17 +233,24 @@ impl Assembly<'_> {
     }
 
     /// Name, material and faces of each object group; what is in none is a part of its own.
-    fn groups(&self, mesh: NodeId, face_count: usize) -> Vec<(String, Material, Vec<u32>)> {
+    fn groups(&self, instance: &Instance, face_count: usize) -> Vec<(String, Material, Vec<u32>)> {
         let scene = self.scene;
-        let own = scene.nodes[mesh].parent.map_or(&scene.nodes[mesh].name, |p| &scene.nodes[p].name);
+        let mesh = instance.mesh;
+        let own = instance.name(scene);
+        let sets: HashMap<&str, NodeId> = (scene.outputs(mesh))
+            .filter(|(_, to)| to.attribute.starts_with("dsm"))
+            .map(|(from, to)| (from.attribute.as_str(), to.node))
+            .collect();
         let mut taken = vec![false; face_count];
         let mut groups = Vec::new();
-        let data = scene.mesh(mesh);
-        for (index, (group, ranges)) in data.iter().flat_map(|m| &m.face_groups).enumerate() {
-            let attribute = format!("iog[0].og[{group}]");
-            let set = (scene.outputs(mesh))
-                .find(|(from, to)| from.attribute == attribute && to.attribute.starts_with("dsm"))
-                .map(|(_, to)| scene.nodes[to.node].name.clone());
+        let all = scene.mesh(mesh).into_iter().flat_map(|m| &m.face_groups);
+        // An instance whose groups are not written has those of the mesh itself.
+        let number = instance.number as u32;
+        let number = if all.clone().any(|((n, _), _)| *n == number) { number } else { 0 };
+        let groups_of_this = all.filter(|((n, _), _)| *n == number);
+        for (index, ((_, group), ranges)) in groups_of_this.enumerate() {
+            let attribute = format!("iog[{number}].og[{group}]");
+            let set = sets.get(attribute.as_str()).map(|set| scene.nodes[*set].name.clone());
             let Some(set) = set else { continue };
             let mut faces = Vec::new();
             for [from, to] in ranges {
@@ -240,7 +269,7 @@ impl Assembly<'_> {
         }
         let rest: Vec<u32> = (0..face_count as u32).filter(|f| !taken[*f as usize]).collect();
         if !rest.is_empty() {
-            groups.push((own.clone(), guess_material(own), rest));
+            groups.push((own.to_owned(), guess_material(own), rest));
         }
         groups
     }
@@ -253,35 +282,50 @@ impl Assembly<'_> {
         polygons: &Polygons,
         place: &DAffine3,
         first_point: u32,
-        notes: &mut Vec<String>,
+        notes: &mut Notes,
     ) -> Result<(), Fault> {
         let scene = self.scene;
+        let base_weights = data.base_weights.get(&geometry).and_then(|p| p.dense(polygons.points.len()));
         let items = self.items(node, data, geometry);
         let mut named: BTreeMap<u32, String> = BTreeMap::new();
         // Full targets first: in-betweens are named after them.
         let (full, between): (Vec<_>, Vec<_>) = items.into_iter().partition(|(_, item)| *item == 6000);
+        if self.told.insert(node) {
+            tell(scene, node, data, !between.is_empty(), notes);
+        }
         for (target, item) in full.into_iter().chain(between) {
             let offsets = self.offsets(node, data, (geometry, target, item), polygons, notes)?;
+            let painted = data.target_weights.get(&(geometry, target));
+            let painted = painted.and_then(|p| p.dense(polygons.points.len()));
             let alias = data.aliases.get(&target).cloned().unwrap_or_else(|| format!("weight_{target}"));
             let name = if item == 6000 {
-                let name = self.shape_name(node, target, &alias, first_point);
-                self.weights.push((node, target, name.clone()));
+                let name = self.shape_name(node, data, target, &alias, first_point, notes);
                 named.insert(target, name.clone());
                 name
             } else {
                 let weight = (f64::from(item) - 5000.0) / 1000.0;
                 let shape = named.get(&target).cloned().unwrap_or_else(|| alias.clone());
+                let hidden = data.hidden_items.get(&(target, item)).copied().unwrap_or(false);
+                if hidden {
+                    let name = format!("{}.{shape} at {weight}", scene.nodes[node].name);
+                    notes.about("in-betweens that the shape editor hides were left out", name);
+                    continue;
+                }
                 let between = weight > 0.0 && weight < 1.0;
                 if !between || !named.contains_key(&target) {
-                    notes.push(format!(
-                        "{}: the target of {shape} at weight {weight} was left out; in-betweens stand between 0 and 1",
-                        scene.nodes[node].name
-                    ));
+                    let name = format!("{}.{shape} at {weight}", scene.nodes[node].name);
+                    notes.about("targets at weights that are not between 0 and 1 were left out", name);
                     continue;
                 }
                 let written = data.item_names.get(&(target, item)).map(|n| plain_name(n));
-                let name = written.unwrap_or_else(|| format!("{shape}_at_{}", item - 5000));
-                if !self.inbetweens.iter().any(|i| i.target == name) {
+                let mut name = written.unwrap_or_else(|| format!("{shape}_at_{}", item - 5000));
+                let taken = |name: &String| {
+                    self.driven.contains_key(name) || self.between.get(name).is_some_and(|s| *s != shape)
+                };
+                while taken(&name) {
+                    name = format!("{shape}_{name}");
+                }
+                if self.between.insert(name.clone(), shape.clone()).is_none() {
                     self.inbetweens.push(Inbetween { shape, target: name.clone(), weight: weight as f32 });
                 }
                 name
@@ -292,7 +336,10 @@ impl Assembly<'_> {
             });
             let identity = *place == DAffine3::IDENTITY;
             for (point, offset) in offsets {
-                let offset = Vec3::from(offset);
+                let mut offset = Vec3::from(offset);
+                for weights in [&base_weights, &painted].into_iter().flatten() {
+                    offset *= weights[point as usize];
+                }
                 let turned =
                     if identity { offset } else { place.transform_vector3(offset.as_dvec3()).as_vec3() };
                 self.shapes[index].1.insert(first_point + point, turned);
@@ -306,7 +353,7 @@ impl Assembly<'_> {
         let mut items: Vec<(u32, u32)> =
             data.items.keys().filter(|(g, ..)| *g == geometry).map(|(_, t, i)| (*t, *i)).collect();
         let prefix = format!("it[{geometry}].itg[");
-        for (_, to) in self.scene.connections.iter().filter(|(_, to)| to.node == node) {
+        for (_, to) in self.scene.inputs(node) {
             let parsed = to.attribute.strip_prefix(&prefix).and_then(|rest| {
                 let (target, rest) = rest.split_once("].iti[")?;
                 let item = rest.strip_suffix("].igt")?;
@@ -326,14 +373,22 @@ impl Assembly<'_> {
         data: &BlendShapeData,
         key: (u32, u32, u32),
         polygons: &Polygons,
-        notes: &mut Vec<String>,
+        notes: &mut Notes,
     ) -> Result<Vec<(u32, [f32; 3])>, Fault> {
         let scene = self.scene;
         let (geometry, target, item) = key;
         let count = polygons.points.len();
         let live = scene.source(node, &format!("it[{geometry}].itg[{target}].iti[{item}].igt"));
         if let Some(plug) = live {
-            let moved = history(scene, plug.node).base.and_then(|base| points(scene, base));
+            let history = history(scene, plug.node);
+            for id in history.ignored.iter().chain(history.blend_shapes.iter().map(|(id, _)| id)) {
+                let deformer = &scene.nodes[*id];
+                notes.about(
+                    "deformers of live targets are not evaluated",
+                    format!("{} ({}) of {}", deformer.name, deformer.kind, scene.path(plug.node)),
+                );
+            }
+            let moved = points(scene, &history, notes);
             match moved {
                 Some(moved) if moved.len() == count => {
                     let difference = |(i, (p, rest)): (usize, (&[f32; 3], &[f32; 3]))| {
@@ -345,10 +400,10 @@ impl Assembly<'_> {
                 moved => {
                     let found =
                         moved.map_or("no points of its own".into(), |m| format!("{} points", m.len()));
-                    notes.push(format!(
-                        "the live target {} has {found} where the mesh has {count}; the stored offsets are used",
-                        scene.path(plug.node)
-                    ));
+                    notes.about(
+                        "live targets that do not fit the mesh: their stored offsets are used",
+                        format!("{} ({found}, the mesh {count})", scene.path(plug.node)),
+                    );
                 }
             }
         }
@@ -356,27 +411,63 @@ impl Assembly<'_> {
         stored_offsets(stored, count)
     }
 
-    /// A name that no other target on the same points has.
-    fn shape_name(&self, node: NodeId, target: u32, alias: &str, first_point: u32) -> String {
+    /// The shape that a weight drives. Weights of several nodes share one only if they have the same name and always
+    /// the same value, as those of a face, its brows and its lashes.
+    fn shape_name(
+        &mut self,
+        node: NodeId,
+        data: &BlendShapeData,
+        target: u32,
+        alias: &str,
+        first_point: u32,
+        notes: &mut Notes,
+    ) -> String {
+        if let Some(index) = self.index_of_weight.get(&(node, target)) {
+            return self.weights[*index].shape.clone();
+        }
         let original = self.appearance.as_ref().and_then(|a| a.shapes.get(target as usize));
-        let name = match original {
+        let wanted = match original {
             Some(original) if plain_name(original) == alias => original.clone(),
             _ => alias.to_owned(),
         };
-        let taken = self.by_name.get(&name).is_some_and(|i| {
-            self.shapes[*i].1.range(first_point..).next().is_some()
-                || self.weights.iter().any(|(n, t, s)| *n == node && *t != target && *s == name)
-        });
-        if taken { format!("{}_{alias}", self.scene.nodes[node].name) } else { name }
+        let effect = effect(self.scene, node, data, target);
+        let mut name = wanted.clone();
+        let mut number = 1;
+        loop {
+            let same_node = |i: &usize| self.weights[*i].node == node;
+            // Two deformers of one mesh are two weights, whatever their names.
+            let here = |i: &usize| self.shapes[*i].1.range(first_point..).next().is_some();
+            match self.driven.get(&name) {
+                None if !self.between.contains_key(&name) => break,
+                Some(i)
+                    if !same_node(i)
+                        && self.weights[*i].effect == effect
+                        && !self.by_name.get(&name).is_some_and(here) =>
+                {
+                    break;
+                }
+                _ => {}
+            }
+            let of = &self.scene.nodes[node].name;
+            name = if number == 1 { format!("{of}_{wanted}") } else { format!("{of}_{wanted}_{number}") };
+            number += 1;
+        }
+        if name != wanted {
+            notes.about("targets of one name that move apart are shapes of their own", name.clone());
+        }
+        self.driven.entry(name.clone()).or_insert(self.weights.len());
+        self.index_of_weight.insert((node, target), self.weights.len());
+        self.weights.push(Weight { node, shape: name.clone(), effect });
+        name
     }
 
     fn finish(
         self,
-        meshes: Vec<NodeId>,
+        instances: Vec<Instance>,
         carrier: Option<NodeId>,
         folder: &Path,
-        notes: &mut Vec<String>,
-    ) -> Built {
+        notes: &mut Notes,
+    ) -> Built<'s> {
         let mut head = self.head;
         let shape = |(name, offsets): (String, BTreeMap<u32, Vec3>)| {
             let (points, offsets) = offsets.into_iter().unzip();
@@ -386,7 +477,9 @@ impl Assembly<'_> {
         let mut rig = None;
         if let Some(appearance) = self.appearance {
             rig = appearance.rig.clone();
-            head.maps = appearance.load_maps(folder, notes);
+            let mut lines = Vec::new();
+            head.maps = appearance.load_maps(folder, &mut lines);
+            lines.into_iter().for_each(|line| notes.say(line));
             head.name = appearance.name;
             head.landmarks = appearance.landmarks;
             head.provenance = appearance.provenance;
@@ -400,7 +493,7 @@ impl Assembly<'_> {
                 }
             }
         }
-        Built { head, inbetweens: self.inbetweens, weights: self.weights, meshes, rig, carrier }
+        Built { head, inbetweens: self.inbetweens, weights: self.weights, instances, rig, carrier }
     }
 }
 

@@ -4,6 +4,7 @@ mod curve;
 mod geometry;
 pub(crate) mod head;
 mod motion;
+mod weight;
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +33,7 @@ pub struct Imported {
     pub inbetweens: Vec<Inbetween>,
     /// The rig file that a scene of ours carries.
     pub rig: Option<serde_json::Value>,
-    /// What was left out, and why.
+    /// What was left out, guessed or repaired, and why: one line per kind, with a count and the first names.
     pub notes: Vec<String>,
 }
 
@@ -57,5 +58,6 @@ pub fn from_bytes(bytes: &[u8], path: &Path, options: &Options) -> Result<Import
     let built = head::build(&scene, options, &name, &folder, &mut notes).map_err(|fault| fault.of(path))?;
     built.head.validate()?;
     let sequence = motion::sequence(&scene, &built, &mut notes);
+    let notes = notes.lines();
     Ok(Imported { head: built.head, sequence, inbetweens: built.inbetweens, rig: built.rig, notes })
 }

@@ -1,46 +1,86 @@
 //! Animation curves of a scene to a sequence.
 
+use std::collections::HashSet;
+
 use glam::{DAffine3, EulerRot};
 use rubor_rig::timeline::{Key, Sequence, Track};
 
-use super::curve::Curve;
-use super::geometry::{local_matrix, world_matrix};
+use super::curve::{Baking, Curve, MOST_BAKED_FRAMES};
+use super::geometry::{Instance, local_matrix, world_matrix};
 use super::head::Built;
-use crate::ascii::scene::{Data, NodeId, Scene, Transform};
+use super::weight::{Drive, Effect};
+use crate::ascii::scene::{Data, NodeId, Plug, Scene, Transform};
+use crate::notes::Notes;
 
 /// Longest sequence, seconds: a day, as the rig allows.
 const LONGEST_S: f64 = 86_400.0;
 /// Most frames that are baked for a moving head.
 const MOST_FRAMES: f64 = 1_000_000.0;
 
-/// The keyed weights and the motion of the head; none without any.
-pub(super) fn sequence(scene: &Scene, built: &Built, notes: &mut Vec<String>) -> Option<Sequence> {
-    let mut weights: Vec<(&str, Curve)> = Vec::new();
-    let mut constants: Vec<(&str, f64)> = Vec::new();
-    for (node, index, shape) in &built.weights {
-        match weight_curve(scene, *node, *index, notes) {
-            Some(curve) => weights.push((shape, curve)),
-            None => {
-                if let Data::BlendShape(data) = &scene.nodes[*node].data
-                    && let Some(weight) = data.weights.get(index).filter(|w| **w != 0.0)
-                {
-                    constants.push((shape, *weight));
-                }
-            }
+/// A weight as a sequence has it.
+enum Played {
+    Constant(f64),
+    /// A curve and what its values are multiplied by.
+    Scaled(Curve, f64),
+    /// Two curves and what their product is multiplied by.
+    Product([Curve; 2], f64),
+}
+
+impl Played {
+    fn curves(&self) -> &[Curve] {
+        match self {
+            Self::Constant(_) => &[],
+            Self::Scaled(curve, _) => std::slice::from_ref(curve),
+            Self::Product(curves, _) => curves,
         }
     }
-    let movers = movers(scene, built);
+}
+
+/// The keyed weights and the motion of the head; none without any.
+pub(super) fn sequence(scene: &Scene, built: &Built<'_>, notes: &mut Notes) -> Option<Sequence> {
+    let mut weights: Vec<(&str, Played)> = Vec::new();
+    let mut seen = HashSet::new();
+    for weight in &built.weights {
+        // Weights that share a shape have the same effect.
+        if !seen.insert(weight.shape.as_str()) {
+            continue;
+        }
+        let Effect { weight: drive, envelope, factor } = &weight.effect;
+        if let Drive::Foreign(plug, _) = drive {
+            let source = &scene.nodes[plug.node];
+            notes.about(
+                format!(
+                    "weights that {} nodes drive are not followed; bake them to keys in Maya",
+                    source.kind
+                ),
+                format!("{} by {} (line {})", weight.shape, source.name, source.line),
+            );
+        }
+        let parts = (part(scene, drive, notes), part(scene, envelope, notes));
+        let played = match parts {
+            (Part::Constant(0.0), _) => continue,
+            (Part::Constant(w), Part::Constant(e)) => Played::Constant(w * e * factor),
+            (Part::Curve(c), Part::Constant(s)) | (Part::Constant(s), Part::Curve(c)) => {
+                let scale = s * factor;
+                if scale == 0.0 { Played::Constant(0.0) } else { Played::Scaled(c, scale) }
+            }
+            (Part::Curve(..), Part::Curve(..)) if *factor == 0.0 => Played::Constant(0.0),
+            (Part::Curve(w), Part::Curve(e)) => Played::Product([w, e], *factor),
+        };
+        weights.push((&weight.shape, played));
+    }
+    let movers = movers(scene, built, notes);
     let moving = movers.iter().any(|m| m.channels.iter().flatten().next().is_some());
     let carried = built
         .carrier
         .and_then(|id| scene.transform(id))
         .is_some_and(|t| t.translate_cm != [0.0; 3] || t.rotate != [0.0; 3]);
-    if weights.is_empty() && constants.is_empty() && !moving && !carried {
+    if weights.is_empty() && !moving && !carried {
         return None;
     }
     let curves = || {
         let channels = movers.iter().flat_map(|m| m.channels.iter().flatten());
-        weights.iter().map(|(_, c)| c).chain(channels)
+        weights.iter().flat_map(|(_, played)| played.curves()).chain(channels)
     };
     // Time 0 is the start of the playback range, or the earliest key before it.
     let range = playback(scene);
@@ -57,31 +97,44 @@ pub(super) fn sequence(scene: &Scene, built: &Built, notes: &mut Vec<String>) ->
     let rate = if (2.0..=10_000.0).contains(&fps) { fps } else { 24.0 };
 
     let mut sequence = Sequence::still(rate, duration.max(1.0 / rate));
-    let mut baked = 0;
-    for (shape, curve) in &weights {
-        let (track, segments) = curve.track(start_s, rate, |v| v as f32);
-        baked += segments;
-        sequence.shapes.entry((*shape).to_owned()).or_insert(track);
-    }
-    for (shape, weight) in constants {
-        sequence.shapes.entry(shape.to_owned()).or_insert(Track::Constant(weight as f32));
+    let mut baking = Baking::default();
+    for (shape, played) in &weights {
+        let track = match played {
+            Played::Constant(value) => Track::Constant(*value as f32),
+            Played::Scaled(curve, scale) => curve.track(start_s, rate, &mut baking, |v| (v * scale) as f32),
+            Played::Product(curves, scale) => product(curves, *scale, start_s, rate, &mut baking),
+        };
+        let (low, high) = range_of(&track);
+        if low < 0.0 || high > 1.0 {
+            notes.about(
+                "weights outside of 0..1 stay in the sequence as keyed; a rig may cut them",
+                format!("{shape} ({low} to {high})"),
+            );
+        }
+        sequence.shapes.insert((*shape).to_owned(), track);
     }
     match &movers[..] {
         // Our own head: its angles are the tracks.
         [only] if Some(only.node) == built.carrier && only.is_plain() => {
-            baked += direct(only, &mut sequence, start_s, rate);
+            direct(only, &mut sequence, start_s, rate, &mut baking);
         }
         _ if moving => bake(scene, &movers, built, &mut sequence, start_s, notes),
         _ => {}
     }
-    if baked > 0 {
-        notes
-            .push(format!("{baked} curve segments have no easing like them and were sampled at every frame"));
+    if baking.too_long > 0 {
+        notes.say(format!(
+            "{} curve segments are too long to be sampled at frames (more than {MOST_BAKED_FRAMES} in all) and are straight lines",
+            baking.too_long
+        ));
+    }
+    if baking.segments > 0 {
+        let baked = baking.segments;
+        notes.say(format!("{baked} curve segments have no easing like them and were sampled at every frame"));
     }
     match sequence.check() {
         Ok(()) => Some(sequence),
         Err(e) => {
-            notes.push(format!("the animation was left out: {e}"));
+            notes.say(format!("the animation was left out: {e}"));
             None
         }
     }
@@ -103,26 +156,48 @@ fn playback(scene: &Scene) -> Option<(f64, f64)> {
     })
 }
 
-fn weight_curve(scene: &Scene, node: NodeId, index: u32, notes: &mut Vec<String>) -> Option<Curve> {
-    let Data::BlendShape(data) = &scene.nodes[node].data else { return None };
-    let indexed = format!("w[{index}]");
-    let by_alias = data.aliases.get(&index).and_then(|alias| scene.source(node, alias));
-    let plug = scene.source(node, &indexed).or(by_alias)?;
-    let source = &scene.nodes[plug.node];
-    match &source.data {
-        Data::Curve(curve) => {
-            if curve.pre_infinity > 0 || curve.post_infinity > 0 {
-                notes.push(format!("{}: before and after its keys the curve holds", source.name));
+/// A number that moves or does not.
+enum Part {
+    Constant(f64),
+    Curve(Curve),
+}
+
+fn part(scene: &Scene, drive: &Drive<'_>, notes: &mut Notes) -> Part {
+    match drive {
+        Drive::Constant(value) | Drive::Foreign(_, value) => Part::Constant(*value),
+        Drive::Curve(node, data) => {
+            if data.pre_infinity > 0 || data.post_infinity > 0 {
+                let note = "curves that go on before or after their keys hold there";
+                notes.about(note, scene.nodes[*node].name.clone());
             }
-            Curve::new(curve, scene.fps, 1.0)
+            Curve::new(data, scene.fps, 1.0).map_or(Part::Constant(0.0), Part::Curve)
         }
-        _ => {
-            notes.push(format!(
-                "line {}: {} ({}) drives {}.{indexed} and is not followed; bake the weights to keys in Maya",
-                source.line, source.name, source.kind, scene.nodes[node].name
-            ));
-            None
-        }
+    }
+}
+
+/// Two curves multiplied, sampled at their keys and at every frame between the first and the last.
+fn product(curves: &[Curve; 2], scale: f64, start_s: f64, fps: f64, baking: &mut Baking) -> Track<f32> {
+    let first = curves.iter().map(Curve::first_s).fold(f64::INFINITY, f64::min) - start_s;
+    let last = curves.iter().map(Curve::last_s).fold(f64::NEG_INFINITY, f64::max) - start_s;
+    let mut times: Vec<f64> =
+        curves.iter().flat_map(Curve::times_s).map(|t| (t - start_s).max(0.0)).collect();
+    let from = (first * fps).max(0.0).ceil();
+    let count = ((last * fps - from).floor() + 1.0).max(0.0);
+    let count = if baking.segment(count) { count as u64 } else { 0 };
+    times.extend((0..count).map(|frame| (from + frame as f64) / fps));
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|later, earlier| *later - *earlier < 1e-9);
+    let value = |t: f64| (curves[0].at(t + start_s) * curves[1].at(t + start_s) * scale) as f32;
+    Track::Keys(times.into_iter().map(|t| Key { t, v: value(t), ease: Default::default() }).collect())
+}
+
+/// Smallest and largest value at the keys.
+fn range_of(track: &Track<f32>) -> (f32, f32) {
+    match track {
+        Track::Constant(value) => (*value, *value),
+        Track::Keys(keys) => keys
+            .iter()
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), k| (low.min(k.v), high.max(k.v))),
     }
 }
 
@@ -160,18 +235,17 @@ impl Mover<'_> {
     }
 }
 
-fn movers<'s>(scene: &'s Scene, built: &Built) -> Vec<Mover<'s>> {
-    let mut seen: Vec<NodeId> = Vec::new();
-    for mesh in &built.meshes {
-        let mut at = scene.nodes[*mesh].parent;
-        while let Some(id) = at {
-            if !seen.contains(&id) {
-                seen.push(id);
-            }
-            at = scene.nodes[id].parent;
-        }
+/// Attributes of a transform that place what is below it, beside the nine channels.
+const PLACING: [&str; 12] = ["t", "r", "s", "sh", "opm", "ro", "rp", "rpt", "sp", "spt", "jo", "ra"];
+
+fn movers<'s>(scene: &'s Scene, built: &Built<'_>, notes: &mut Notes) -> Vec<Mover<'s>> {
+    let mut seen: HashSet<NodeId> = HashSet::new();
+    let mut order: Vec<NodeId> = Vec::new();
+    for instance in &built.instances {
+        order.extend(instance.above.iter().filter(|id| seen.insert(**id)));
+        visibility_is_not_followed(scene, instance.mesh, notes);
     }
-    let channel = |node: NodeId, whole: &str, axis: &str| {
+    let channel = |node: NodeId, whole: &str, axis: &str, notes: &mut Notes| {
         let single = format!("{whole}{axis}");
         let nested = format!("{whole}.{single}");
         let plug = scene.source(node, &single).or_else(|| scene.source(node, &nested))?;
@@ -180,27 +254,66 @@ fn movers<'s>(scene: &'s Scene, built: &Built) -> Vec<Mover<'s>> {
             "r" => scene.radians,
             _ => 1.0,
         };
-        match &scene.nodes[plug.node].data {
-            Data::Curve(curve) => Curve::new(curve, scene.fps, unit),
-            _ => None,
+        let source = &scene.nodes[plug.node];
+        match &source.data {
+            Data::Curve(curve) => {
+                if curve.pre_infinity > 0 || curve.post_infinity > 0 {
+                    let note = "curves that go on before or after their keys hold there";
+                    notes.about(note, source.name.clone());
+                }
+                Curve::new(curve, scene.fps, unit)
+            }
+            _ => {
+                not_followed(scene, node, &single, plug, notes);
+                None
+            }
         }
     };
-    let mover = |node: NodeId| {
-        let transform = scene.transform(node)?;
+    let mut movers = Vec::new();
+    for node in order {
+        let Some(transform) = scene.transform(node) else { continue };
+        visibility_is_not_followed(scene, node, notes);
+        for attribute in PLACING {
+            if let Some(plug) = scene.source(node, attribute) {
+                not_followed(scene, node, attribute, plug, notes);
+            }
+        }
         let names = ["t", "r", "s"].into_iter().flat_map(|w| ["x", "y", "z"].map(|a| (w, a)));
         let mut channels: [Option<Curve>; 9] = Default::default();
         for (slot, (whole, axis)) in channels.iter_mut().zip(names) {
-            *slot = channel(node, whole, axis);
+            *slot = channel(node, whole, axis, notes);
         }
         let keyed = channels.iter().any(Option::is_some);
-        (keyed || Some(node) == built.carrier).then_some(Mover { node, transform, channels })
-    };
-    seen.into_iter().filter_map(mover).collect()
+        if keyed || Some(node) == built.carrier {
+            movers.push(Mover { node, transform, channels });
+        }
+    }
+    movers
 }
 
-/// Channels of our own transform as tracks; returns the number of baked segments.
-fn direct(mover: &Mover<'_>, sequence: &mut Sequence, start_s: f64, fps: f64) -> usize {
-    let mut baked = 0;
+fn not_followed(scene: &Scene, node: NodeId, attribute: &str, plug: &Plug, notes: &mut Notes) {
+    let source = &scene.nodes[plug.node];
+    notes.about(
+        format!(
+            "transforms that {} nodes drive stand where they are stored; bake them to keys in Maya",
+            source.kind
+        ),
+        format!("{}.{attribute} by {}", scene.nodes[node].name, source.name),
+    );
+}
+
+fn visibility_is_not_followed(scene: &Scene, node: NodeId, notes: &mut Notes) {
+    if let Some(plug) = scene.source(node, "v") {
+        let source = &scene.nodes[plug.node];
+        notes.about(
+            "driven visibility is not followed, the stored one counts",
+            format!("{} by {} ({})", scene.nodes[node].name, source.name, source.kind),
+        );
+    }
+}
+
+/// Channels of our own transform as tracks.
+fn direct(mover: &Mover<'_>, sequence: &mut Sequence, start_s: f64, fps: f64, baking: &mut Baking) {
     let degrees = |v: f64| v.to_degrees() as f32;
     let rotate = mover.transform.rotate;
     let head = &mut sequence.head;
@@ -208,27 +321,18 @@ fn direct(mover: &Mover<'_>, sequence: &mut Sequence, start_s: f64, fps: f64) ->
     let angles = [(&mut head.pitch_degrees, 3), (&mut head.yaw_degrees, 4), (&mut head.roll_degrees, 5)];
     for (track, i) in angles {
         *track = match &mover.channels[i] {
-            Some(curve) => {
-                let (track, segments) = curve.track(start_s, fps, degrees);
-                baked += segments;
-                track
-            }
+            Some(curve) => curve.track(start_s, fps, baking, degrees),
             None => Track::Constant(degrees(rotate[i - 3])),
         };
     }
     let metres = |v: f64| (v * 0.01) as f32;
     let tracks: Vec<Track<f32>> = (0..3)
         .map(|i| match &mover.channels[i] {
-            Some(curve) => {
-                let (track, segments) = curve.track(start_s, fps, metres);
-                baked += segments;
-                track
-            }
+            Some(curve) => curve.track(start_s, fps, baking, metres),
             None => Track::Constant(metres(mover.transform.translate_cm[i])),
         })
         .collect();
     head.translation = together(&tracks);
-    baked
 }
 
 /// Three tracks as one. Keys of the same times and easings stay; otherwise every time of any of them gets a key.
@@ -253,12 +357,21 @@ fn together(tracks: &[Track<f32>]) -> Track<[f32; 3]> {
 fn bake(
     scene: &Scene,
     movers: &[Mover<'_>],
-    built: &Built,
+    built: &Built<'_>,
     sequence: &mut Sequence,
     start_s: f64,
-    notes: &mut Vec<String>,
+    notes: &mut Notes,
 ) {
-    let Some(mesh) = built.meshes.first() else { return };
+    let Some(first) = built.instances.first() else { return };
+    // A sequence has one motion for the whole head: that of the first mesh.
+    let moved_by = |instance: &Instance| -> Vec<NodeId> {
+        instance.above.iter().filter(|id| movers.iter().any(|m| m.node == **id)).copied().collect()
+    };
+    let of_first = moved_by(first);
+    for instance in built.instances.iter().filter(|i| moved_by(i) != of_first) {
+        let note = format!("meshes that do not move as {} does are moved with it", first.path(scene));
+        notes.about(note, instance.path(scene));
+    }
     let at = |time_s: Option<f64>| {
         let replaced = |id: NodeId| {
             let mover = movers.iter().find(|m| m.node == id)?;
@@ -268,11 +381,11 @@ fn bake(
                 None => local_matrix(mover.transform),
             })
         };
-        world_matrix(scene, *mesh, &replaced)
+        world_matrix(scene, first, &replaced)
     };
     let frames = f64::from(sequence.frame_count());
     if frames > MOST_FRAMES {
-        notes.push("the motion of the head was left out: the sequence is too long".into());
+        notes.say("the motion of the head was left out: the sequence is too long");
         return;
     }
     let rest = at(None).inverse();
@@ -291,12 +404,12 @@ fn bake(
         translation.push(Key { t, v: (shift * 0.01).as_vec3().to_array(), ease: Default::default() });
     }
     if stretched || !rest.is_finite() {
-        notes.push("keyed scale of the head is left out".into());
+        notes.say("keyed scale of the head is left out");
     }
     let [yaw, pitch, roll] = keys;
     sequence.head.yaw_degrees = Track::Keys(yaw);
     sequence.head.pitch_degrees = Track::Keys(pitch);
     sequence.head.roll_degrees = Track::Keys(roll);
     sequence.head.translation = Track::Keys(translation);
-    notes.push("the motion of the head was sampled at every frame".into());
+    notes.say("the motion of the head was sampled at every frame");
 }

@@ -1,13 +1,13 @@
 //! A recording to a sequence.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use rayon::prelude::*;
-use rubor_rig::names::canonical;
+use rubor_rig::names::{Key, canonical};
 use rubor_rig::timeline::{HeadMotion, Sequence, Track};
 
 use super::filter::{median_in, reduce, resample, smooth};
-use super::{MOST_SAMPLES, Recording, Retarget, ShapeTarget};
+use super::{MOST_SAMPLES, MOST_VALUES, Recording, Retarget, ShapeTarget, list};
 use crate::error::ImportError;
 
 /// What became of a recording.
@@ -69,8 +69,9 @@ pub fn to_sequence(
     // Half a step of slack: a take of n samples at the sequence's rate has n frames in spite of rounding.
     let count = (recording.length_s() * fps + 1e-3).floor() as usize + 1;
     if count > MOST_SAMPLES {
-        let expected = format!("at most {MOST_SAMPLES}");
-        return Err(wrong("length", format!("{count} frames at {fps} a second"), &expected));
+        let gap = times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let found = format!("{count} frames at {fps} a second, samples up to {gap:.1} s apart");
+        return Err(wrong("length", found, &format!("at most {MOST_SAMPLES} frames")));
     }
     let mut report = Report {
         samples: times.len(),
@@ -82,8 +83,22 @@ pub fn to_sequence(
 
     // Which channels act on which shape.
     let mut routes: Vec<(usize, Vec<ShapeTarget>)> = Vec::new();
+    let by_key = retarget.by_key();
+    let mut by_name: HashMap<&str, &str> = HashMap::new();
+    let mut doubled = Vec::new();
     for (index, channel) in recording.channels.iter().enumerate() {
-        let targets = match (retarget.targets(&channel.name), canonical(&channel.name)) {
+        let exact = retarget.shapes.get(&channel.name).map(|t| &t.0[..]);
+        let asked = exact.or_else(|| by_key.get(&Key::new(&channel.name)).copied());
+        let known = canonical(&channel.name);
+        if let (None, Some(shape)) = (asked, known)
+            && let Some(first) = by_name.insert(shape, &channel.name)
+        {
+            // Two spellings of one shape are one weight, not two that add up.
+            by_name.insert(shape, first);
+            doubled.push(format!("{} (after {first})", channel.name));
+            continue;
+        }
+        let targets = match (asked, known) {
             (Some([]), _) => {
                 report.left_out.push(channel.name.clone());
                 continue;
@@ -98,6 +113,14 @@ pub fn to_sequence(
         let shapes = targets.iter().map(|t| (channel.name.clone(), t.shape.clone()));
         report.mapped.extend(shapes);
         routes.push((index, targets));
+    }
+
+    if !doubled.is_empty() {
+        report.notes.push(format!("further columns of one shape were left out: {}", list(&doubled)));
+    }
+    if routes.len().saturating_mul(count) > MOST_VALUES {
+        let found = format!("{count} frames of {} columns", routes.len());
+        return Err(wrong("length", found, &format!("at most {MOST_VALUES} values")));
     }
 
     let curves: Vec<Curve> = routes
@@ -136,8 +159,7 @@ fn key_count(track: &Track<f32>) -> usize {
 }
 
 fn unused(recording: &Recording, retarget: &Retarget) -> Vec<String> {
-    use rubor_rig::names::Key;
-    let keys: Vec<Key> = recording.channels.iter().map(|c| Key::new(&c.name)).collect();
+    let keys: HashSet<Key> = recording.channels.iter().map(|c| Key::new(&c.name)).collect();
     let names = retarget.shapes.keys();
     names.filter(|name| !keys.contains(&Key::new(name))).cloned().collect()
 }

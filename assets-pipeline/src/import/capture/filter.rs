@@ -13,22 +13,28 @@ pub(super) fn median_in(times_s: &[f64], values: &[f32], from_s: f64, to_s: f64)
     Some(*inside.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
+/// Samples on each side that a smoothed one looks at: two seconds of the fastest tracker of faces.
+const MOST_NEIGHBOURS: usize = 256;
+
 /// Bilateral filter over time (Tomasi and Manduchi 1998): a mean of neighbours near in time *and* in value. Jitter
 /// smaller than `amplitude` goes, a blink stays as sharp as it was, and nothing is delayed.
 ///
-/// `window_s` is the standard deviation in time, `amplitude` that in value.
+/// `window_s` is the standard deviation in time, `amplitude` that in value. At most [`MOST_NEIGHBOURS`] samples on each
+/// side count, which bounds the time for dense samples.
 pub(super) fn smooth(times_s: &[f64], values: &[f32], window_s: f64, amplitude: f64) -> Vec<f32> {
     // Beyond three deviations a weight is below 0.012.
     let reach = 3.0 * window_s;
     let (in_time, in_value) = (-0.5 / (window_s * window_s), -0.5 / (amplitude * amplitude));
     let mut start = 0;
     let mut out = Vec::with_capacity(values.len());
-    for (time, value) in times_s.iter().zip(values) {
+    for (i, (time, value)) in times_s.iter().zip(values).enumerate() {
+        start = start.max(i.saturating_sub(MOST_NEIGHBOURS));
         while times_s[start] < time - reach {
             start += 1;
         }
+        let end = (i + MOST_NEIGHBOURS + 1).min(values.len());
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (t, v) in times_s[start..].iter().zip(&values[start..]) {
+        for (t, v) in times_s[start..end].iter().zip(&values[start..end]) {
             if *t > time + reach {
                 break;
             }

@@ -11,12 +11,14 @@
 //! A flat matrix of 16 numbers is column by column, as both programs write it; rows of four are rows. Both have the
 //! axes of a head here (+X the character's left, +Y up, +Z out of the face), and lengths are not used.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use glam::{EulerRot, Mat3, Quat, Vec3};
 use serde_json::{Map as Object, Value};
 
-use super::{Channel, HeadAngles, MOST_SAMPLES, Recording};
+use super::timecode::{SECONDS, Timeline, Unit};
+use super::{Channel, HeadAngles, LARGEST, MOST_SAMPLES, MOST_VALUES, Recording, text};
 use crate::error::ImportError;
 
 /// Frames a second where a file has neither times nor a rate.
@@ -27,15 +29,21 @@ const WEIGHTS: [&str; 6] =
     ["blendShapes", "faceBlendshapes", "face_blendshapes", "blendshapes", "categories", "shapes"];
 const MATRICES: [&str; 4] =
     ["transform", "facialTransformationMatrixes", "facial_transformation_matrixes", "matrix"];
-/// Name of a time and its seconds a unit; none where the size of the steps decides.
-const TIMES: [(&str, Option<f64>); 7] = [
-    ("timestampMs", Some(1e-3)),
-    ("timestamp_ms", Some(1e-3)),
-    ("timestampSeconds", Some(1.0)),
-    ("timestamp", None),
-    ("time", None),
-    ("t", None),
-    ("timeCode", None),
+/// Names of a time; the unit that a name ends in counts, else the size of the steps decides.
+const TIMES: [&str; 13] = [
+    "timestampMs",
+    "timestamp_ms",
+    "timestampUs",
+    "timestamp_us",
+    "timestampNs",
+    "timestamp_ns",
+    "timestampSeconds",
+    "timestamp",
+    "timeMs",
+    "time_ms",
+    "time",
+    "t",
+    "timeCode",
 ];
 const COLUMN_NAMES: [&str; 3] = ["facsNames", "blendShapeNames", "names"];
 const COLUMN_ROWS: [&str; 2] = ["weightMat", "weights"];
@@ -46,11 +54,15 @@ const RATES: [&str; 3] = ["exportFps", "fps", "frameRate"];
 /// # Errors
 /// Syntax, none of the layouts above, text where a number belongs, no frame with a face.
 pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Recording, ImportError> {
-    let root: Value = serde_json::from_slice(bytes).map_err(|e| {
+    let root: Value = serde_json::from_str(&text(bytes, path)?).map_err(|e| {
         let at = format!("line {}, column {}", e.line(), e.column());
         ImportError::content(path, at, e.to_string(), "JSON")
     })?;
-    let mut reader = Reader { path, recording: Recording { path: path.to_owned(), ..Recording::default() } };
+    let mut reader = Reader {
+        path,
+        recording: Recording { path: path.to_owned(), ..Recording::default() },
+        channels: HashMap::new(),
+    };
     let fps = match first(&root, &RATES) {
         None => None,
         Some((name, value)) => match value.as_f64().filter(|f| *f > 0.0 && *f <= 10_000.0) {
@@ -96,6 +108,8 @@ fn kind(value: &Value) -> &'static str {
 struct Reader<'a> {
     path: &'a Path,
     recording: Recording,
+    /// Place of each name in the channels.
+    channels: HashMap<String, usize>,
 }
 
 impl Reader<'_> {
@@ -104,8 +118,8 @@ impl Reader<'_> {
     }
 
     fn number(&self, value: &Value, at: impl Fn() -> String) -> Result<f32, ImportError> {
-        let number = value.as_f64().map(|v| v as f32).filter(|v| v.is_finite());
-        number.ok_or_else(|| self.wrong(&at(), &value.to_string(), "a finite number"))
+        let number = value.as_f64().map(|v| v as f32).filter(|v| v.abs() <= LARGEST);
+        number.ok_or_else(|| self.wrong(&at(), &value.to_string(), "a finite number, at most a million"))
     }
 
     fn columns(&mut self, names: &[Value], field: &str, rows: &[Value], fps: f64) -> Result<(), ImportError> {
@@ -116,9 +130,10 @@ impl Reader<'_> {
             };
             channels.push(Channel { name: name.to_owned(), values: Vec::with_capacity(rows.len()) });
         }
-        if rows.len() > MOST_SAMPLES {
-            let expected = format!("at most {MOST_SAMPLES}");
-            return Err(self.wrong(field, &format!("{} frames", rows.len()), &expected));
+        if rows.len() > MOST_SAMPLES || rows.len().saturating_mul(channels.len()) > MOST_VALUES {
+            let found = format!("{} frames of {} names", rows.len(), channels.len());
+            let expected = format!("at most {MOST_SAMPLES} frames and {MOST_VALUES} values");
+            return Err(self.wrong(field, &found, &expected));
         }
         for (i, row) in rows.iter().enumerate() {
             let at = format!("{field}, frame {i}");
@@ -141,7 +156,8 @@ impl Reader<'_> {
             let expected = format!("at most {MOST_SAMPLES}");
             return Err(self.wrong("frames", &frames.len().to_string(), &expected));
         }
-        let mut stamps: Vec<(f64, Option<f64>)> = Vec::new();
+        let mut stamps: Vec<f64> = Vec::new();
+        let mut names: Vec<&str> = Vec::new();
         let mut angles: Vec<Option<[f32; 3]>> = Vec::new();
         let mut lost = 0;
         for (i, frame) in frames.iter().enumerate() {
@@ -153,24 +169,37 @@ impl Reader<'_> {
                 lost += 1;
                 continue;
             };
-            let written = TIMES.iter().find_map(|(n, unit)| frame.get(n).map(|v| (*n, *unit, v)));
-            stamps.push(match (written, fps) {
-                (Some((name, unit, value)), _) => match value.as_f64() {
-                    Some(time) => (time, unit),
+            let written = TIMES.iter().find_map(|n| frame.get(n).map(|v| (*n, v)));
+            let (name, time) = match written {
+                Some((name, value)) => match value.as_f64() {
+                    Some(time) => (name, time),
                     None => {
                         let at = format!("frame {i}, {name}");
                         return Err(self.wrong(&at, &value.to_string(), "a number"));
                     }
                 },
-                (None, fps) => (i as f64 / fps.unwrap_or(DEFAULT_FPS), Some(1.0)),
-            });
+                None => ("", i as f64 / fps.unwrap_or(DEFAULT_FPS)),
+            };
+            if let Some(first) = names.first().filter(|first| **first != name) {
+                let said = |name: &str| if name.is_empty() { "no time".into() } else { format!("{name:?}") };
+                return Err(self.wrong(
+                    &format!("frame {i}"),
+                    &said(name),
+                    &format!("{} as before", said(first)),
+                ));
+            }
+            names.push(name);
+            stamps.push(time);
             let sample = stamps.len() - 1;
             for (name, value) in weights {
-                self.set(&name, sample, value);
+                self.set(name, sample, value)?;
             }
             angles.push(first(frame, &MATRICES).and_then(|(_, matrix)| euler(matrix)));
         }
         let count = stamps.len();
+        if self.recording.channels.len().saturating_mul(count) > MOST_VALUES {
+            return Err(self.too_many(count));
+        }
         for channel in &mut self.recording.channels {
             let last = channel.values.last().copied().unwrap_or_default();
             channel.values.resize(count, last);
@@ -178,7 +207,7 @@ impl Reader<'_> {
         if lost > 0 {
             self.recording.notes.push(format!("{lost} frames without a face were left out"));
         }
-        self.set_times(&stamps)?;
+        let timeline = self.times(names.first().copied().unwrap_or_default(), &stamps);
         if let Some(first) = angles.iter().find_map(|a| *a) {
             // A frame without a matrix holds the rotation of the one before it.
             let mut held = first;
@@ -189,9 +218,16 @@ impl Reader<'_> {
                 head.pitch.push(held[1]);
                 head.roll.push(held[2]);
             }
+            [&mut head.yaw, &mut head.pitch, &mut head.roll].into_iter().for_each(|v| timeline.retain(v));
             self.recording.head = Some(head);
         }
+        self.recording.times_s = timeline.times_s;
         Ok(())
+    }
+
+    fn too_many(&self, samples: usize) -> ImportError {
+        let found = format!("{samples} frames of {} names", self.recording.channels.len());
+        self.wrong("frames", &found, &format!("at most {MOST_VALUES} values"))
     }
 
     /// Name and weight of each shape of a frame; none without a face.
@@ -236,42 +272,34 @@ impl Reader<'_> {
         object.iter().map(one).collect()
     }
 
-    /// Sets a weight; samples before it that lack the name hold its last value.
-    fn set(&mut self, name: &str, sample: usize, value: f32) {
+    /// Sets a weight; samples before it that lack the name hold its last value. A name that stands twice in a frame
+    /// counts once.
+    fn set(&mut self, name: String, sample: usize, value: f32) -> Result<(), ImportError> {
         let channels = &mut self.recording.channels;
-        // Frames mostly list names in the same order, so the next index is tried by position of the last hit.
-        let index = channels.iter().position(|c| c.name == name).unwrap_or_else(|| {
-            channels.push(Channel { name: name.to_owned(), values: Vec::new() });
+        let index = *self.channels.entry(name).or_insert_with_key(|name| {
+            channels.push(Channel { name: name.clone(), values: Vec::new() });
             channels.len() - 1
         });
+        if channels.len().saturating_mul(sample + 1) > MOST_VALUES {
+            return Err(self.too_many(sample + 1));
+        }
         let values = &mut channels[index].values;
         let last = values.last().copied().unwrap_or_default();
         values.resize(sample, last);
         values.push(value);
+        Ok(())
     }
 
-    fn set_times(&mut self, stamps: &[(f64, Option<f64>)]) -> Result<(), ImportError> {
-        let Some((start, unit)) = stamps.first().copied() else { return Ok(()) };
-        let mut steps: Vec<f64> = stamps.windows(2).map(|w| w[1].0 - w[0].0).collect();
-        steps.sort_by(f64::total_cmp);
-        let step = steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-        // Two frames of a face are never a second apart: larger steps are milliseconds, or microseconds.
-        let unit = unit.unwrap_or(if step > 1000.0 {
-            1e-6
-        } else if step > 1.0 {
-            1e-3
-        } else {
-            1.0
-        });
-        for (i, (time, _)) in stamps.iter().enumerate() {
-            let time = (time - start) * unit;
-            if self.recording.times_s.last().is_some_and(|before| time <= *before) || !time.is_finite() {
-                let expected = "a time after that of the frame before it";
-                return Err(self.wrong(&format!("frame {i}"), &format!("{time} s from the start"), expected));
-            }
-            self.recording.times_s.push(time);
-        }
-        Ok(())
+    /// Times of the frames; frames that do not move on in time are left out.
+    fn times(&mut self, name: &str, stamps: &[f64]) -> Timeline {
+        let (unit, note) = if name.is_empty() { (SECONDS, None) } else { Unit::of(name, stamps) };
+        let first = stamps.first().copied().unwrap_or_default();
+        let seconds: Vec<f64> = stamps.iter().map(|t| (t - first) * unit.seconds).collect();
+        let timeline = Timeline::new(&seconds, false);
+        self.recording.channels.iter_mut().for_each(|channel| timeline.retain(&mut channel.values));
+        self.recording.notes.extend(note);
+        self.recording.notes.extend(timeline.notes.iter().cloned());
+        timeline
     }
 }
 

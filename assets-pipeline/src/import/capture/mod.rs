@@ -25,6 +25,7 @@ pub mod live_link;
 mod retarget;
 mod timecode;
 
+use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
 use rubor_rig::timeline::{Key, Sequence, Track};
@@ -91,6 +92,10 @@ impl Recording {
 
 /// Largest recording: an hour at 120 samples a second. What is longer is no take of a face.
 const MOST_SAMPLES: usize = 432_000;
+/// Most values of a recording, samples times channels: an hour of 52 shapes at 120 samples a second is a third of it.
+const MOST_VALUES: usize = 64 << 20;
+/// Largest weight or angle of a recording.
+const LARGEST: f32 = 1e6;
 /// No tracker of faces is faster.
 const FASTEST: f64 = 1000.0;
 
@@ -113,6 +118,39 @@ pub fn read(path: &Path) -> Result<Recording, ImportError> {
                 ".csv (Live Link Face) or .json (MediaPipe, ARKit)",
             ))
         }
+    }
+}
+
+/// The text of a file: UTF-8, or UTF-16 with a byte order mark, as spreadsheets write it.
+fn text<'a>(bytes: &'a [u8], path: &Path) -> Result<Cow<'a, str>, ImportError> {
+    let wide = |unit: fn([u8; 2]) -> u16| {
+        let units =
+            bytes[2..].chunks(2).map(|pair| unit([pair[0], pair.get(1).copied().unwrap_or_default()]));
+        let text: Result<String, _> = char::decode_utf16(units).collect();
+        text.map(Cow::Owned).map_err(|e| {
+            let found = format!("a surrogate without its other half ({:x})", e.unpaired_surrogate());
+            ImportError::content(path, "the text", found, "UTF-16 as its first two bytes say, or UTF-8")
+        })
+    };
+    match bytes {
+        [0xff, 0xfe, ..] => return wide(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => return wide(u16::from_be_bytes),
+        _ => {}
+    }
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    std::str::from_utf8(bytes).map(Cow::Borrowed).map_err(|e| {
+        let line = bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
+        ImportError::content(path, format!("line {line}"), "bytes that are not UTF-8", "text in UTF-8")
+    })
+}
+
+/// The first names of a list, and how many more there are.
+fn list(names: &[String]) -> String {
+    const MOST_NAMES: usize = 5;
+    let first = names[..names.len().min(MOST_NAMES)].join(", ");
+    match names.len().saturating_sub(MOST_NAMES) {
+        0 => first,
+        more => format!("{first} and {more} more"),
     }
 }
 

@@ -13,7 +13,7 @@
 //! assert_eq!(retarget.neutral.unwrap().to, 0.5);
 //! ```
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::path::Path;
 
@@ -25,6 +25,9 @@ use serde::de::{self, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::error::ImportError;
+
+/// Largest gain, offset and limit.
+const MOST_GAIN: f32 = 1000.0;
 
 /// How a recording becomes tracks. What it does not name keeps its own name and its value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -259,12 +262,13 @@ impl Retarget {
         Self { shapes: recording.channels.iter().map(entry).collect(), ..Self::default() }
     }
 
-    /// Shapes of a channel; `None` where the file does not name the channel.
-    pub(super) fn targets(&self, channel: &str) -> Option<&[ShapeTarget]> {
-        let key = Key::new(channel);
-        let exact = self.shapes.get(channel);
-        let found = exact.or_else(|| self.shapes.iter().find(|(n, _)| Key::new(n) == key).map(|(_, t)| t))?;
-        Some(&found.0)
+    /// Finds the shapes of channels by name in any spelling; the first entry of a spelling counts.
+    pub(super) fn by_key(&self) -> HashMap<Key, &[ShapeTarget]> {
+        let mut found = HashMap::new();
+        for (name, targets) in &self.shapes {
+            found.entry(Key::new(name)).or_insert(&targets.0[..]);
+        }
+        found
     }
 
     fn check(&self) -> Result<(), (Vec<json::Step>, String, &'static str)> {
@@ -275,34 +279,40 @@ impl Retarget {
             return Err((at(&["neutral"]), format!("{} to {}", n.from, n.to), "a time range from 0 on"));
         }
         if let Some(s) = self.smoothing {
-            for (name, v) in [
-                ("windowMs", s.window_ms),
-                ("amplitude", s.amplitude),
-                ("amplitudeDegrees", s.amplitude_degrees),
+            // Longer windows and larger amplitudes are means over the whole take, at a cost that grows with both.
+            for (name, v, most, expected) in [
+                ("windowMs", s.window_ms, 500.0, "more than 0 and at most 500"),
+                ("amplitude", s.amplitude, 10.0, "more than 0 and at most 10"),
+                ("amplitudeDegrees", s.amplitude_degrees, 360.0, "more than 0 and at most 360"),
             ] {
-                if !(v > 0.0 && v <= 10_000.0) {
-                    return Err((at(&["smoothing", name]), v.to_string(), "more than 0 and at most 10000"));
+                if !(v > 0.0 && v <= most) {
+                    return Err((at(&["smoothing", name]), v.to_string(), expected));
                 }
             }
         }
         if !(self.tolerance >= 0.0 && self.tolerance < 1.0) {
             return Err((at(&["tolerance"]), self.tolerance.to_string(), "0 or more and less than 1"));
         }
-        if self.limit.is_some_and(|l| !(l > 0.0 && l.is_finite())) {
-            return Err((at(&["limit"]), format!("{:?}", self.limit), "more than 0, or null"));
+        if let Some(limit) = self.limit
+            && !(limit > 0.0 && limit <= MOST_GAIN)
+        {
+            return Err((at(&["limit"]), limit.to_string(), "more than 0 and at most 1000, or null"));
         }
+        let fits = |value: f32| value.abs() <= MOST_GAIN;
         for (name, targets) in &self.shapes {
             for ShapeTarget { shape, gain, offset } in &targets.0 {
-                if shape.is_empty() || !gain.is_finite() || !offset.is_finite() {
+                if shape.is_empty() || !fits(*gain) || !fits(*offset) {
                     let found = format!("{shape:?}, gain {gain}, offset {offset}");
-                    return Err((at(&["shapes", name]), found, "a shape with a finite gain and offset"));
+                    let expected = "a shape with gain and offset from -1000 to 1000";
+                    return Err((at(&["shapes", name]), found, expected));
                 }
             }
         }
         let head = &self.head;
         for (name, angle) in [("yaw", head.yaw), ("pitch", head.pitch), ("roll", head.roll)] {
-            if !angle.gain.is_finite() || !angle.offset_degrees.is_finite() {
-                return Err((at(&["head", name]), format!("{angle:?}"), "finite numbers"));
+            if !fits(angle.gain) || !fits(angle.offset_degrees) {
+                let found = format!("gain {}, offset {}", angle.gain, angle.offset_degrees);
+                return Err((at(&["head", name]), found, "gain and offset from -1000 to 1000"));
             }
         }
         Ok(())

@@ -63,7 +63,8 @@ fn timecodes_of_every_kind() {
     let rate = |base, ntsc, drop| Rate { base, ntsc, drop };
     assert_eq!(parse("01:02:03:04.500"), Some(Stamp::Frames { seconds: 3723, frame: 4.5, drop: false }));
     assert_eq!(parse("00:01:00;02"), Some(Stamp::Frames { seconds: 60, frame: 2.0, drop: true }));
-    assert_eq!(parse("1.25"), Some(Stamp::Seconds(1.25)));
+    assert_eq!(parse("1.25"), Some(Stamp::Number(1.25)));
+    assert_eq!(parse("1e-05"), Some(Stamp::Number(1e-5)));
     assert_eq!(parse("0:01:02.5"), Some(Stamp::Seconds(62.5)));
     for wrong in ["", "a", "1:2", "00:60:00:00", "00:00:61:00", "1:2:3:-4", "1:2:3:4:5", "1:2:3:1e9", "nan"] {
         assert_eq!(parse(wrong), None, "{wrong:?}");
@@ -79,11 +80,12 @@ fn timecodes_of_every_kind() {
         let step = r.seconds(parse(first).unwrap()) - r.seconds(parse(last).unwrap());
         assert!((step - 1.001 / f64::from(base)).abs() < 1e-9, "{step}");
     }
+    let of = |stamps: &[Stamp], asked| Rate::of(stamps, asked).0;
     let stamps = |list: &[&str]| list.iter().map(|t| parse(t).unwrap()).collect::<Vec<_>>();
-    assert_eq!(Rate::of(&stamps(&["0:0:0:0", "0:0:1:29", "0:0:3:0"]), None).base, 30);
-    assert_eq!(Rate::of(&stamps(&["0:0:0:0", "0:0:1:58.5", "0:0:3:0"]), None).base, 60);
-    assert_eq!(Rate::of(&stamps(&["0:0:0:0", "0:0:0:10"]), None).base, 60);
-    assert_eq!(Rate::of(&stamps(&["0:0:0:0", "0:0:0:10"]), Some(29.97)), rate(30, true, false));
+    assert_eq!(of(&stamps(&["0:0:0:0", "0:0:1:29", "0:0:3:0"]), None).base, 30);
+    assert_eq!(of(&stamps(&["0:0:0:0", "0:0:1:58.5", "0:0:3:0"]), None).base, 60);
+    assert_eq!(of(&stamps(&["0:0:0:0", "0:0:0:10"]), None).base, 60);
+    assert_eq!(of(&stamps(&["0:0:0:0", "0:0:0:10"]), Some(29.97)), rate(30, true, false));
 }
 
 #[test]
@@ -100,7 +102,7 @@ fn a_take_passes_midnight_and_repeated_samples_count_once() {
     assert_eq!(recording.times_s.len(), 4);
     assert_eq!(recording.channels[0].values, [0.0, 0.1, 0.2, 0.3]);
     assert!((recording.times_s[2] - 1.0).abs() < 1e-6);
-    assert!(recording.notes.iter().any(|n| n.starts_with("1 rows that do not move on")));
+    assert!(recording.notes.iter().any(|n| n.starts_with("1 samples that repeat the time")));
 }
 
 #[test]
@@ -295,7 +297,10 @@ fn json_layouts_say_the_same() {
         (r#"[{"blendShapes": {"jawOpen": "wide"}}]"#, "frame 0, jawOpen: found \"wide\""),
         (r#"[{"blendShapes": 7}]"#, "frame 0, weights: found a number"),
         (r#"{"names": ["a"], "weights": [[1, 2]]}"#, "weights, frame 0: found 2 numbers, expected 1"),
-        (r#"[{"t": 1, "blendShapes": {"jawOpen": 1}}, {"t": 1, "blendShapes": {"jawOpen": 1}}]"#, "frame 1"),
+        (
+            r#"[{"t": 1, "blendShapes": {"jawOpen": 1}}, {"blendShapes": {"jawOpen": 1}}]"#,
+            "frame 1: found no time",
+        ),
     ] {
         let error = json::from_bytes(text.as_bytes(), Path::new("take.json")).unwrap_err().to_string();
         assert!(error.contains(expected), "{error:?} lacks {expected:?}");
