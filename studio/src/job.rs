@@ -453,6 +453,23 @@ mod tests {
     }
 
     #[test]
+    fn an_environment_beside_its_sequence_is_found_and_watched() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, image] = ["s.json", "here.exr"].map(|name| folder.path().join(name));
+        std::fs::write(&file, r#"{ "fps": 1, "duration": 1, "environment": { "name": "here.exr" } }"#)
+            .unwrap();
+        std::fs::write(&image, b"light").unwrap();
+        let (sequence, _) = inputs::sequence(Some(&file)).unwrap();
+        assert_eq!(sequence.environment.as_ref().unwrap().name, image.to_string_lossy());
+        let job = Job::new(&[], Rig::default_rig().unwrap(), sequence).unwrap();
+        assert_eq!(job.environment.as_ref().and_then(|e| e.file.as_deref()), Some(&*image));
+        job.load_heads().unwrap();
+        std::fs::write(&image, b"other").unwrap();
+        let message = job.load_heads().unwrap_err().to_string();
+        assert!(message.contains("here.exr") && message.contains("changed"), "{message}");
+    }
+
+    #[test]
     fn the_schema_names_every_part() {
         let schema = Job::json_schema_value();
         for part in ["heads", "rig", "sequence", "lights", "settings", "inset", "frames"] {

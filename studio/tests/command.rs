@@ -3,6 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use rubor_assets::image_io::{SampleKind, save_image};
+use rubor_rig::map::Map;
+
 fn rubor(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rubor")).args(arguments).output().expect("the command starts")
 }
@@ -90,7 +93,11 @@ fn a_small_job_makes_everything_and_resumes() {
     let first = rubor(&job);
     assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
     let stats: serde_json::Value = serde_json::from_slice(&first.stdout).expect("statistics are JSON");
-    assert_eq!(stats["framesDrawn"], 2);
+    assert_eq!((&stats["of"], &stats["framesDrawn"]), (&"job".into(), &2.into()));
+    assert_eq!(stats["settings"]["quality"]["antialias"], "smaa-1x");
+    let kept = std::fs::read(folder.0.path().join("out/stats.json")).expect("stats.json");
+    let kept: rubor::Report = serde_json::from_slice(&kept).expect("stats.json is a report");
+    assert_eq!(serde_json::to_value(&kept).expect("JSON")["files"], stats["files"]);
     assert!(stats["triangles"].as_u64().is_some_and(|n| n > 10_000));
     let names = folder.names("out");
     for expected in [
@@ -174,7 +181,7 @@ fn wrong_arguments_get_one_clear_message() {
     let inside = format!("{file}/frames");
     let output = rubor(&["render", "-o", &inside]);
     if can_draw() {
-        assert_eq!(output.status.code(), Some(2), "a folder inside a file cannot be made");
+        assert_eq!(output.status.code(), Some(1), "a folder inside a file cannot be made");
     }
 }
 
@@ -256,7 +263,9 @@ fn a_head_goes_out_and_comes_back_with_its_performance() {
     );
     refused(&folder, &["export", "--head", &head, "--tolerance", "2", "-o", &glb], &["0.5"]);
     refused(&folder, &["export", "--head", &head, "--textures", "webp", "-o", &usd], &["png or jpeg"]);
-    refused(&folder, &["export", "--head", &head, "-o", &folder.path("no/such/folder/x.glb")], &["x.glb"]);
+    let nowhere = rubor(&["export", "--head", &head, "-o", &folder.path("no/such/folder/x.glb")]);
+    assert_eq!(nowhere.status.code(), Some(1), "what cannot be written is no wrong input");
+    assert!(String::from_utf8_lossy(&nowhere.stderr).contains("x.glb"));
 }
 
 #[test]
@@ -349,12 +358,130 @@ fn files_that_cannot_be_trusted_are_refused_and_nothing_is_written() {
 
 #[test]
 fn schemas_and_adapters_are_json() {
-    for of in ["rig", "sequence"] {
+    for of in ["job", "settings", "rig", "sequence", "report"] {
         let output = rubor(&["schema", of]);
         let schema: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a schema is JSON");
-        assert!(schema["properties"].is_object());
+        assert!(schema["properties"].is_object() || schema["oneOf"].is_array(), "{of}");
     }
     let output = rubor(&["adapters", "--json"]);
     let list: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a list is JSON");
     assert!(list.is_array());
 }
+
+#[test]
+fn a_job_that_was_written_draws_the_same_bytes() {
+    if !can_draw() {
+        return;
+    }
+    let folder = Folder::new();
+    let sequence = folder.file("s.json", JAW.replace("24", "2").as_bytes());
+    let light =
+        folder.file("light.json", br#"{ "fps": 1, "duration": 1, "environment": { "name": "here.exr" } }"#);
+    let sky = Map { width: 8, height: 4, channels: 3, values: (0..96).map(|i| 0.02 * i as f32).collect() };
+    save_image(&folder.0.path().join("here.exr"), &sky, SampleKind::F32).expect("an environment");
+    let head = small_head(&folder);
+    let (out, again) = (folder.path("first"), folder.path("again"));
+    let short = ["--no-export", "--no-video"];
+    let settings = ["--size", "48x32", "--antialias", "smaa-t2x", "--exposure", "2.3", "--shadow-size", "64"];
+    let first = ["render", "--head", &head, "--sequence", &sequence, "--lights", &light, "-o", &out];
+    let done =
+        |output: Output| assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    done(rubor(&[&first[..], &settings, &short].concat()));
+    let job = folder.path("first/job.json");
+    let command = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_rubor"));
+        // Another folder: paths in the job do not depend on it.
+        command.current_dir("/").args(arguments).output().expect("the command starts")
+    };
+    done(command(&[&["render", "--job", &job, "-o", &again][..], &short].concat()));
+    for file in ["frame.0001.png", "frame.0002.png", "contact_sheet.png", "job.json"] {
+        let [a, b] = [&out, &again].map(|f| std::fs::read(Path::new(f).join(file)).expect("a result"));
+        assert!(a == b, "{file}");
+    }
+    // Frames of two processes, one of them the last frame alone.
+    let parts = folder.path("parts");
+    let part =
+        |frame: &str| command(&["render", "--job", &job, "-o", &parts, "--no-export", "--frames", frame]);
+    done(part("2"));
+    done(part("1"));
+    for file in ["frame.0001.png", "frame.0002.png"] {
+        let [a, b] = [&out, &parts].map(|f| std::fs::read(Path::new(f).join(file)).expect("a frame"));
+        assert!(a == b, "{file}");
+    }
+    // Flags change what they name, and nothing else.
+    let other = folder.path("other");
+    done(command(&[&["render", "--job", &job, "-o", &other, "--size", "32x32"][..], &short].concat()));
+    let changed: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(Path::new(&other).join("job.json")).expect("a job"))
+            .expect("JSON");
+    assert_eq!(changed["settings"]["output"]["size"], serde_json::json!([32, 32]));
+    assert_eq!(changed["settings"]["quality"]["antialias"], "smaa-t2x");
+    let idle = command(
+        &[&["render", "--job", &job, "-o", &other, "--preset", "draft", "--frames", "1"][..], &short]
+            .concat(),
+    );
+    assert!(String::from_utf8_lossy(&idle.stderr).contains("--preset has no effect"));
+
+    refused(&folder, &["render", "--job", &job, "--head", &head], &["--job", "--head"]);
+    refused(&folder, &["render", "--job", &folder.path("none.json")], &["none.json", "no such file"]);
+    let text = std::fs::read_to_string(&job).expect("a job");
+    let slip = folder.file("slip.json", text.replace("\"scatter\"", "\"scater\"").as_bytes());
+    refused(&folder, &["render", "--job", &slip], &["slip.json:", "scater", "scatter"]);
+    save_image(&folder.0.path().join("here.exr"), &Map { values: vec![1.0; 96], ..sky }, SampleKind::F32)
+        .expect("another");
+    refused(&folder, &["render", "--job", &job], &["here.exr", "changed", "hint"]);
+    std::fs::copy(folder.path("small.glb"), folder.path("kept.glb")).expect("a copy");
+    folder.file("small.glb", include_bytes!("../../assets/head.glb"));
+    refused(&folder, &["render", "--job", &job], &["small.glb", "changed", "hint"]);
+}
+
+#[test]
+fn closed_pipes_end_quietly() {
+    let folder = Folder::new();
+    let file = folder.file("s.json", JAW.as_bytes());
+    for arguments in [&["schema", "sequence"][..], &["check", &file], &["profile"]] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_rubor"));
+        let mut child = command
+            .args(arguments)
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("the command starts");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("the command ends");
+        assert_eq!(String::from_utf8_lossy(&output.stderr), "", "{arguments:?}");
+        assert!(output.status.success(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_machine_without_a_desktop_is_no_error() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_rubor"));
+    command.arg("adapters").env_remove("NODEVICE_SELECT").env_remove("XDG_RUNTIME_DIR");
+    let said = String::from_utf8_lossy(&command.output().expect("the command starts").stderr).into_owned();
+    assert!(!said.contains("XDG_RUNTIME_DIR"), "{said}");
+}
+
+#[test]
+fn notes_of_one_kind_are_one_line() {
+    let folder = Folder::new();
+    let head = small_head(&folder);
+    let output = rubor(&["check", &head, &folder.file("s.json", LACKING.as_bytes())]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let lines = said.lines().filter(|l| l.contains("has no shape")).count();
+    assert!(
+        lines == 2 && said.contains("and 1 more (4 in all)"),
+        "one line for the rig, one for the sequence: {said}"
+    );
+    if !can_draw() {
+        return;
+    }
+    let sequence = folder.path("s.json");
+    let short = ["--size", "16x16", "--frames", "1", "--no-export", "-o", &folder.path("out")];
+    let output = rubor(&[&["render", "--head", &head, "--sequence", &sequence][..], &short].concat());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let lines: Vec<_> = said.lines().filter(|l| l.contains("the head has no shape \"")).collect();
+    assert!(output.status.success() && lines.len() == 1, "{said}");
+}
+
+const LACKING: &str = r#"{ "fps": 1, "duration": 1, "shapes": { "mouthSmileLeft": 1, "mouthSmileRight": 1, "browInnerUp": 1, "tongueOut": 1 } }"#;

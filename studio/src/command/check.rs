@@ -299,6 +299,11 @@ fn as_note(finding: &Finding) -> Note {
         Severity::Note => "  note",
     };
     let fix = finding.fix.as_ref().map(|fix| format!("\n    fix: {fix}")).unwrap_or_default();
+    // A name in the place tells findings apart as one in the message does; a line only says where the first one is.
+    if finding.at.starts_with("line ") {
+        let place = format!("{}: ", finding.at);
+        return Note { about: word.into(), place, message: format!("{}{fix}", finding.message) };
+    }
     Note::new(word, format!("{finding}{fix}"))
 }
 

@@ -53,9 +53,10 @@ fn flags() -> &'static [Flag] {
             leaf,
             name: leaf.flag(),
             value_name: match leaf.kind.as_str() {
-                "integer" if leaf.flag() == "size" => "WxH",
+                "array" => &leaf.expected,
                 "integer" => "N",
                 "number" => "X",
+                _ if leaf.is_list => "NAMES",
                 _ => "NAME",
             },
         };
