@@ -4,23 +4,23 @@
 //! the turning head are written into it. `RUBOR_FRAMES` (default 120) sets their number.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
-use glam::{Mat4, Quat, Vec3};
-use rubor_renderer::antialias::{Mode, Preset, reference::linear_from_srgb};
-use rubor_renderer::{
-    AppearanceMethods, Camera, ColorTable, EnvironmentMap, Gpu, HeadInstance, HeadOnGpu, Image, Light,
-    LightKind, Renderer, ScatterMethod, Scene, Settings, TransmitMethod, antialias,
-};
+use glam::{Quat, Vec3};
+use rubor::studio::Frame;
+use rubor::{Studio, inputs};
+use rubor_renderer::Image;
+use rubor_renderer::antialias::reference::linear_from_srgb;
+use rubor_renderer::channels::Channel;
+use rubor_renderer::settings::{AntialiasMethod, Output, Quality, ScatterMethod, Settings, TransmitMethod};
+use rubor_rig::evaluate::{CameraState, EnvironmentState, LightState, Shot};
 use rubor_rig::face_state::FaceState;
-use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
-use rubor_rig::skin::profile::Profile;
+use rubor_rig::timeline::LightKind;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// Pixels a side.
+/// Pixels on a side.
 const SIDE: u32 = 192;
-/// Samples a side of a pixel for the truth at rest and in motion.
+/// Samples on a side of a pixel for the truth at rest and in motion.
 const SAMPLES: [u32; 2] = [8, 4];
 /// Contrast of luma that makes a pixel count as one at an edge: the threshold of the preset.
 const EDGE: f32 = 0.1;
@@ -28,23 +28,28 @@ const EDGE: f32 = 0.1;
 /// Pictures, and the motion of each of their pixels.
 type Film = (Vec<Image>, Vec<Vec<[f32; 2]>>);
 
-fn settings(mode: Mode, supersampling: u32) -> Settings {
+/// The filters; supersampling is what they are compared with.
+fn modes() -> Vec<AntialiasMethod> {
+    AntialiasMethod::all().filter(|m| m.number().is_none()).collect()
+}
+
+fn settings(antialias: AntialiasMethod) -> Settings {
     Settings {
-        size: [SIDE; 2],
-        // What scatters has no edges.
-        scatter: ScatterMethod::None,
-        transmit: TransmitMethod::None,
-        appearance: AppearanceMethods::default(),
-        profile: Arc::new(Profile::deon_six()),
-        antialias: antialias::Settings::new(mode, Preset::High),
-        supersampling,
-        shadow_size: 512,
-        exposure: 1.8,
+        output: Output { size: [SIDE; 2], ..Output::default() },
+        quality: Quality {
+            // What scatters has no edges.
+            scatter: ScatterMethod::None,
+            transmit: TransmitMethod::None,
+            antialias,
+            shadow_size: 512,
+            ..Quality::default()
+        },
+        ..Settings::default()
     }
 }
 
-fn camera(position: Vec3, target: Vec3) -> Camera {
-    Camera { position, target, up: Vec3::Y, fov_degrees: 24.0 }
+fn camera(position: Vec3, target: Vec3) -> CameraState {
+    CameraState { position, target, up: Vec3::Y, fov_y: 24f32.to_radians() }
 }
 
 /// Light of each pixel.
@@ -106,47 +111,43 @@ fn talking(head: &rubor_rig::head::Head, frame: u32) -> FaceState {
 }
 
 struct Stage {
-    renderer: Renderer,
+    studio: Studio,
     head: rubor_rig::head::Head,
-    on_gpu: HeadOnGpu,
-    environment: rubor_renderer::Environment,
 }
 
 impl Stage {
     fn new() -> Result<Self> {
-        let renderer = Renderer::new(Gpu::new(None)?)?;
-        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../assets/head.glb");
-        let head = rubor_assets::import::gltf::from_bytes(&std::fs::read(&path)?, &path)?.head;
-        let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
-        let color = ColorTable { width: lookup.width, height: lookup.height, texels: &lookup.texels };
-        let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &color)?;
-        let environment = EnvironmentMap::studio().upload(renderer.gpu());
-        Ok(Self { renderer, head, on_gpu, environment })
+        let mut studio = Studio::open(None)?;
+        let head = inputs::head(None)?.head;
+        studio.set_heads([&head])?;
+        Ok(Self { studio, head })
     }
 
-    fn draw(&mut self, state: &FaceState, camera: Camera, settings: &Settings) -> Result<Image> {
-        let key = Light {
-            kind: LightKind::Directional { direction: Vec3::new(-0.6, -0.5, -0.8) },
-            color_linear: Vec3::splat(1.1),
-            radius: 0.05,
-            casts_shadow: true,
+    fn draw(&mut self, state: &FaceState, camera: CameraState, settings: &Settings) -> Result<Frame> {
+        let key = LightState {
+            name: "key".into(),
+            kind: LightKind::Directional,
+            power_linear: Vec3::splat(1.1),
+            position: Vec3::ZERO,
+            direction: Vec3::new(-0.6, -0.5, -0.8).normalize(),
+            cone_half_angles: [0.0; 2],
+            shadow: true,
         };
-        let heads = [HeadInstance { head: &self.on_gpu, state, world_from_head: Mat4::IDENTITY }];
-        let scene = Scene {
-            heads: &heads,
+        let environment = EnvironmentState { name: "studio".into(), intensity: 0.6, rotation_y: 0.0 };
+        let shot = Shot {
+            time_s: 0.0,
+            face: state.clone(),
             camera,
-            lights: &[key],
-            environment: Some(&self.environment),
-            environment_intensity: 0.6,
-            background_linear: Vec3::new(0.016, 0.018, 0.021),
+            lights: vec![key],
+            environment: Some(environment),
         };
-        Ok(self.renderer.render(&scene, settings)?.0)
+        Ok(self.studio.render(&[shot], 0.0, settings)?)
     }
 }
 
 fn main() -> Result<()> {
     let mut stage = Stage::new()?;
-    println!("adapter: {}", stage.renderer.gpu().info.name);
+    println!("adapter: {}", stage.studio.adapter().name);
     let part = std::env::args().nth(1).unwrap_or_else(|| "all".to_owned());
     if part != "motion" {
         at_rest(&mut stage)?;
@@ -163,35 +164,40 @@ fn at_rest(stage: &mut Stage) -> Result<()> {
         stage.head.mesh.points.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), p| (l.min(*p), h.max(*p)));
     let middle = 0.5 * (low + high);
     let eyes = middle + Vec3::new(0.03, 0.02, 0.5 * (high.z - low.z));
-    println!("\n| view | {} |", Mode::ALL.map(Mode::name).join(" | "));
-    println!("| --- |{}", " --- |".repeat(Mode::ALL.len()));
+    let modes = modes();
+    let names: Vec<&str> = modes.iter().map(|m| m.name()).collect();
+    println!("\n| view | {} |", names.join(" | "));
+    println!("| --- |{}", " --- |".repeat(modes.len()));
     for (name, position, target) in [
         ("from the front", middle + Vec3::new(0.0, 0.0, 0.9), middle),
         ("from the side", middle + Vec3::new(0.75, 0.05, 0.5), middle),
         ("far", middle + Vec3::new(-0.6, 0.1, 2.2), middle),
         ("eye", eyes + Vec3::new(0.02, 0.0, 0.25), eyes),
     ] {
-        let mut sums = [(0.0, 0.0); Mode::ALL.len()];
+        let mut sums = vec![(0.0, 0.0); modes.len()];
         // The view is moved by parts of a pixel.
         for (dx, dy) in [(0.0, 0.0), (0.37, 0.61), (0.71, 0.23), (0.13, 0.87)] {
             let distance = (position - target).length();
             let pixel = 2.0 * distance * 12f32.to_radians().tan() / SIDE as f32;
             let shift = Vec3::new(dx * pixel, dy * pixel, 0.0);
             let camera = camera(position + shift, target + shift);
-            stage.renderer.cut(0);
-            let truth = light(&stage.draw(&neutral, camera, &settings(Mode::None, SAMPLES[0]))?);
-            let counts = at_edges(&stage.draw(&neutral, camera, &settings(Mode::None, 1))?);
-            for (mode, sum) in Mode::ALL.into_iter().zip(&mut sums) {
-                stage.renderer.cut(0);
-                let mut image = stage.draw(&neutral, camera, &settings(mode, 1))?;
+            stage.studio.cut(0);
+            let mut draw =
+                |settings: &Settings| -> Result<Image> { Ok(stage.draw(&neutral, camera, settings)?.image) };
+            let truth = light(&draw(&settings(AntialiasMethod::Ssaa(SAMPLES[0])))?);
+            let counts = at_edges(&draw(&settings(AntialiasMethod::None))?);
+            for (&mode, sum) in modes.iter().zip(&mut sums) {
+                stage.studio.cut(0);
+                let mut image = stage.draw(&neutral, camera, &settings(mode))?.image;
                 for _ in 0..if mode.is_temporal() { 2 } else { 0 } {
-                    image = stage.draw(&neutral, camera, &settings(mode, 1))?;
+                    image = stage.draw(&neutral, camera, &settings(mode))?.image;
                 }
                 let (square, count) = rms(&light(&image), &truth, &counts);
                 *sum = (sum.0 + square, sum.1 + count);
             }
         }
-        let cells = sums.map(|(square, count)| format!("{:.4}", (square / count).sqrt()));
+        let cells: Vec<String> =
+            sums.iter().map(|(square, count)| format!("{:.4}", (square / count).sqrt())).collect();
         println!("| {name} | {} |", cells.join(" | "));
     }
     Ok(())
@@ -227,22 +233,25 @@ fn in_motion(stage: &mut Stage, folder: Option<PathBuf>) -> Result<()> {
     let middle = 0.5 * (low + high);
     let camera = camera(middle + Vec3::new(0.0, 0.0, 0.9), middle);
     // T2x first: it knows the velocities. Then the truth, which all are compared with.
-    let mut sequence = |mode: Mode, samples: u32| -> Result<Film> {
-        stage.renderer.cut(0);
+    let mut sequence = |mode: AntialiasMethod| -> Result<Film> {
+        stage.studio.cut(0);
         let (mut images, mut velocities) = (Vec::new(), Vec::new());
+        let mut settings = settings(mode);
+        if mode == AntialiasMethod::SmaaT2x {
+            settings.output.channels.push(Channel::Velocity);
+        }
         for frame in 0..frames {
             let state = talking(&stage.head, frame);
-            images.push(stage.draw(&state, camera, &settings(mode, samples))?);
-            if mode == Mode::SmaaT2x {
-                velocities.push(stage.renderer.read_velocity()?);
-            }
+            let drawn = stage.draw(&state, camera, &settings)?;
+            images.push(drawn.image);
+            velocities.extend(drawn.channels.first().map(|velocity| velocity.texels().collect()));
         }
         Ok((images, velocities))
     };
-    let (t2x, velocities) = sequence(Mode::SmaaT2x, 1)?;
-    let (plain, _) = sequence(Mode::None, 1)?;
+    let (t2x, velocities) = sequence(AntialiasMethod::SmaaT2x)?;
+    let (plain, _) = sequence(AntialiasMethod::None)?;
     let masks: Vec<Vec<bool>> = plain.iter().map(at_edges).collect();
-    let (truth, _) = sequence(Mode::None, SAMPLES[1])?;
+    let (truth, _) = sequence(AntialiasMethod::Ssaa(SAMPLES[1]))?;
     let truth: Vec<Vec<[f32; 3]>> = truth.iter().map(light).collect();
     let change = |images: &[Vec<[f32; 3]>]| {
         let pairs = images.windows(2).zip(&velocities[1..]).zip(&masks[1..]);
@@ -254,11 +263,11 @@ fn in_motion(stage: &mut Stage, folder: Option<PathBuf>) -> Result<()> {
     println!("\n{frames} frames, warped difference of frames at edges; ssaa:{} {reference:.5}", SAMPLES[1]);
     println!("| mode | over ssaa:{} | error to ssaa:{} |", SAMPLES[1], SAMPLES[1]);
     println!("| --- | --- | --- |");
-    for mode in Mode::ALL {
+    for mode in modes() {
         let images = match mode {
-            Mode::SmaaT2x => t2x.clone(),
-            Mode::None => plain.clone(),
-            _ => sequence(mode, 1)?.0,
+            AntialiasMethod::SmaaT2x => t2x.clone(),
+            AntialiasMethod::None => plain.clone(),
+            _ => sequence(mode)?.0,
         };
         let lights: Vec<_> = images.iter().map(light).collect();
         let (square, count) = lights

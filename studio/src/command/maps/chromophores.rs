@@ -1,0 +1,86 @@
+//! `rubor maps chromophores`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use rubor_assets::convert::chromophores::{self, AlbedoEncoding, DEFAULT_GAMUT_THRESHOLD};
+use rubor_assets::convert::into_head;
+use rubor_assets::convert::skin_texels::{SkinTexels, require_layout};
+use rubor_assets::image_io::{SampleKind, load_image};
+use rubor_rig::map::Map;
+use rubor_rig::mask::Mask;
+use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
+use serde_json::{Value, json};
+
+use super::destination::{Destination, file_name};
+use super::load_mask;
+use rubor::output;
+use rubor::{Failure, Outcome};
+
+/// Texels of the look-up along each axis.
+const LOOKUP_SIZE: u32 = 128;
+
+/// Arguments of `rubor maps chromophores`.
+#[derive(Debug, Args)]
+pub(crate) struct ChromophoresArgs {
+    /// Albedo texture or cross-polarised photograph
+    albedo: PathBuf,
+    /// Image whose white is skin; alpha applies as well
+    #[arg(long)]
+    mask: Option<PathBuf>,
+    /// The file is linear Rec. 709 [default: sRGB for integers, linear for floats]
+    #[arg(long)]
+    linear: bool,
+    /// Factor that brings the values to reflectance
+    #[arg(long, default_value_t = 1.0)]
+    gain: f32,
+    /// CIEDE2000 residual above which a texel is out of gamut
+    #[arg(long, default_value_t = DEFAULT_GAMUT_THRESHOLD)]
+    threshold: f32,
+    #[command(flatten)]
+    to: Destination,
+}
+
+pub(super) fn run(a: &ChromophoresArgs) -> Outcome<Value> {
+    let receiver = a.to.head()?;
+    let image = load_image(&a.albedo)?;
+    let mut mask = load_mask(&image, a.mask.as_deref())?;
+    let encoding = if a.linear { AlbedoEncoding::Linear } else { AlbedoEncoding::Automatic };
+    let albedo = chromophores::linear_albedo(&image, encoding, a.gain)?;
+    if let Some(receiver) = &receiver {
+        let skin = SkinTexels::new(&receiver.head, mask.width, mask.height).mask();
+        let not_black = |(m, c): (&bool, &[f32])| *m && c.iter().any(|v| *v > 0.0);
+        let data = Mask {
+            mapped: mask.mapped.iter().zip(albedo.values.chunks_exact(3)).map(not_black).collect(),
+            ..mask
+        };
+        require_layout(&a.albedo.display().to_string(), &data, &skin)?;
+        mask = mask.and(&skin);
+    }
+    if mask.count() == 0 {
+        return Err(Failure::input(format!("{}: found no mapped texel, expected skin", a.albedo.display())));
+    }
+    let lookup = SkinModel::new(&ChromophoreModel::default()).bake(LOOKUP_SIZE, LOOKUP_SIZE);
+    let maps = chromophores::convert(&albedo, &mask, &lookup, a.threshold)?;
+    let mut report = serde_json::to_value(maps.summary).map_err(Failure::job)?;
+    let Some(mut receiver) = receiver else {
+        output::folder(&a.to.output)?;
+        for (name, map) in
+            [("melanin", &maps.melanin), ("hemoglobin", &maps.hemoglobin), ("residual", &maps.residual)]
+        {
+            output::save_map(&a.to.output.join(format!("{name}.exr")), map, SampleKind::F32)?;
+        }
+        let marks = Map {
+            values: maps.out_of_gamut.mapped.iter().map(|m| f32::from(u8::from(*m))).collect(),
+            ..maps.residual.clone()
+        };
+        output::save_map(&a.to.output.join("out_of_gamut.png"), &marks, SampleKind::U8)?;
+        report["written"] = json!(a.to.output);
+        return Ok(report);
+    };
+    let origin = a.to.origin(format!("rubor maps chromophores of {}", file_name(&a.albedo)));
+    into_head::put_chromophores(&mut receiver.head, maps.melanin, maps.hemoglobin, &origin)?;
+    a.to.write(&receiver)?;
+    report["written"] = json!(a.to.output);
+    Ok(report)
+}

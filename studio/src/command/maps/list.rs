@@ -1,0 +1,110 @@
+//! `rubor maps list` and `rubor maps extract`: what maps a head has.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use rubor_assets::image_io::SampleKind;
+use rubor_renderer::footprint::{self, Footprint};
+use rubor_rig::head::{Head, SkinMaps};
+use rubor_rig::map::Map;
+use serde_json::{Value, json};
+
+use rubor::Outcome;
+use rubor::{inputs, output};
+
+/// Arguments of `rubor maps list`.
+#[derive(Debug, Args)]
+pub(crate) struct ListArgs {
+    /// Head (.glb, .gltf) [default: the built-in head]
+    head: Option<PathBuf>,
+}
+
+/// Arguments of `rubor maps extract`.
+#[derive(Debug, Args)]
+pub(crate) struct ExtractArgs {
+    /// Head (.glb, .gltf) [default: the built-in head]
+    head: Option<PathBuf>,
+    /// Folder for the images (.exr)
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+/// Every map with the name of its file.
+fn named(maps: &SkinMaps) -> Vec<(String, &Map)> {
+    let single = [
+        ("melanin", &maps.melanin),
+        ("hemoglobin", &maps.hemoglobin),
+        ("neutral_mean", &maps.hemoglobin_mean),
+        ("slopes", &maps.slopes),
+        ("specular", &maps.specular),
+        ("scattering", &maps.scattering),
+        ("hair", &maps.hair),
+    ];
+    let mut all: Vec<(String, &Map)> =
+        single.into_iter().filter_map(|(name, map)| Some((name.to_owned(), map.as_ref()?))).collect();
+    for d in &maps.distributions {
+        all.push((format!("{}_scale", d.name), &d.scale));
+        all.push((format!("{}_bias", d.name), &d.bias));
+    }
+    all.extend(maps.wrinkle_slopes.iter().enumerate().map(|(i, m)| (format!("wrinkles_{i}"), m)));
+    all.extend(maps.zones.iter().map(|z| (format!("zone_{}", z.name), &z.mask)));
+    all
+}
+
+/// Key of [`rubor_rig::head::Provenance::of`] for a file name.
+fn provenance_key(name: &str) -> &str {
+    match name {
+        "neutral_mean" => "hemoglobin",
+        _ if name.ends_with("_scale") || name.ends_with("_bias") => "distributions",
+        _ if name.starts_with("wrinkles_") => "wrinkle_slopes",
+        _ if name.starts_with("zone_") => "zones",
+        _ => name,
+    }
+}
+
+pub(super) fn run(a: &ListArgs) -> Outcome<Value> {
+    let head = inputs::head(a.head.as_deref())?.head;
+    let row = |(name, map): (String, &Map)| {
+        let low = map.values.iter().copied().fold(f32::INFINITY, f32::min);
+        let high = map.values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let of = format!("maps.{}", provenance_key(&name));
+        let origin = head.provenance.iter().find(|p| p.of == of);
+        json!({
+            "name": name,
+            "size": format!("{}x{}", map.width, map.height),
+            "channels": map.channels,
+            "low": low,
+            "high": high,
+            "origin": origin.map(|p| p.kind),
+        })
+    };
+    let maps: Vec<Value> = named(&head.maps).into_iter().map(row).collect();
+    Ok(json!({ "maps": maps, "on_the_graphics_card": on_card(&head) }))
+}
+
+/// Bytes of the textures that a head becomes, raw and as blocks.
+pub(crate) fn on_card(head: &Head) -> Vec<Value> {
+    let row = |f: Footprint| {
+        json!({
+            "texture": f.texture,
+            "size": format!("{}x{}x{}", f.size[0], f.size[1], f.layers),
+            "format": f.format,
+            "bytes": f.bytes,
+            "block_format": f.block_format,
+            "block_bytes": f.block_bytes,
+        })
+    };
+    footprint::of_maps(&head.maps).into_iter().map(row).collect()
+}
+
+pub(super) fn extract(a: &ExtractArgs) -> Outcome<Value> {
+    let head = inputs::head(a.head.as_deref())?.head;
+    output::folder(&a.output)?;
+    let mut written = Vec::new();
+    for (name, map) in named(&head.maps) {
+        let file = a.output.join(format!("{}.exr", name.replace(['/', '\\'], "_")));
+        output::save_map(&file, map, SampleKind::F32)?;
+        written.push(file);
+    }
+    Ok(json!({ "written": written }))
+}

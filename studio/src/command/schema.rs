@@ -1,0 +1,37 @@
+//! `rubor schema`: JSON schemas for editors.
+
+use clap::ValueEnum;
+use rubor::{Job, Outcome, Report};
+use rubor_renderer::settings::Settings;
+
+use super::print_json;
+
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Which file the schema is for
+    of: Kind,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Kind {
+    /// What to draw, and how: job.json
+    Job,
+    /// How frames are made: `settings` in job.json and stats.json
+    Settings,
+    /// Expressions and states: rig.json
+    Rig,
+    /// Tracks, camera and lights: sequence.json
+    Sequence,
+    /// What a job, a benchmark, a chart or a gallery measured: stats.json and --json
+    Report,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    print_json(&match arguments.of {
+        Kind::Job => Job::json_schema_value(),
+        Kind::Settings => schemars::schema_for!(Settings).to_value(),
+        Kind::Rig => rubor_rig::expression::rig_schema(),
+        Kind::Sequence => rubor_rig::timeline::sequence_schema(),
+        Kind::Report => Report::json_schema_value(),
+    })
+}

@@ -1,0 +1,162 @@
+//! How work fails: one message, perhaps a hint, and whose fault it is.
+//!
+//! One rule decides the exit code of the command: 0 done, 1 the job failed (a file that cannot be written, a lost
+//! device, a result that is not good enough), 2 the input or the arguments are wrong.
+
+use std::fmt::Display;
+use std::path::Path;
+
+use rubor_assets::error::{ExportError, ImportError};
+use rubor_assets::image_io::ImageError;
+use rubor_renderer::RenderError;
+
+/// What went wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The input or the arguments are wrong.
+    Input,
+    /// The input is right, and the job failed.
+    Job,
+    /// Whoever reads what is printed has closed the pipe: nothing is wrong, and nothing is left to do.
+    ClosedPipe,
+}
+
+/// Why work stopped.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{message}{}", .hint.as_ref().map(|h| format!("\n  hint: {h}")).unwrap_or_default())]
+pub struct Failure {
+    fault: Fault,
+    message: String,
+    hint: Option<String>,
+}
+
+/// What work returns.
+pub type Outcome<T = ()> = Result<T, Failure>;
+
+impl Failure {
+    /// The input or the arguments are wrong.
+    pub fn input(message: impl Display) -> Self {
+        Self { fault: Fault::Input, message: message.to_string(), hint: None }
+    }
+
+    /// The job failed.
+    pub fn job(message: impl Display) -> Self {
+        Self { fault: Fault::Job, message: message.to_string(), hint: None }
+    }
+
+    /// A file or folder cannot be written.
+    pub fn write(path: &Path, reason: impl Display) -> Self {
+        Self::job(format!("{}: cannot be written: {reason}", path.display()))
+    }
+
+    /// A file or folder cannot be read.
+    pub fn read(path: &Path, reason: impl Display) -> Self {
+        Self::input(format!("{}: cannot be read: {reason}", path.display()))
+    }
+
+    /// Nobody reads what is printed any more.
+    pub fn closed_pipe() -> Self {
+        Self { fault: Fault::ClosedPipe, message: "the output was closed".into(), hint: None }
+    }
+
+    /// Adds what to try.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Display) -> Self {
+        self.hint = Some(hint.to_string());
+        self
+    }
+
+    /// What went wrong.
+    pub fn fault(&self) -> Fault {
+        self.fault
+    }
+
+    /// Exit code of a process that stops for it.
+    pub fn exit_code(&self) -> u8 {
+        match self.fault {
+            Fault::ClosedPipe => 0,
+            Fault::Job => 1,
+            Fault::Input => 2,
+        }
+    }
+}
+
+impl From<rubor_rig::error::RigError> for Failure {
+    fn from(e: rubor_rig::error::RigError) -> Self {
+        Self::input(e)
+    }
+}
+
+impl From<ImportError> for Failure {
+    fn from(e: ImportError) -> Self {
+        Self::input(e)
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(e: ExportError) -> Self {
+        match e {
+            ExportError::Content { .. } | ExportError::Head(_) => Self::input(e),
+            ExportError::Write { .. } | ExportError::Encode { .. } => Self::job(e),
+        }
+    }
+}
+
+impl From<rubor_maya::error::ReadError> for Failure {
+    fn from(e: rubor_maya::error::ReadError) -> Self {
+        Self::input(e)
+    }
+}
+
+impl From<rubor_maya::error::WriteError> for Failure {
+    fn from(e: rubor_maya::error::WriteError) -> Self {
+        use rubor_maya::error::WriteError as E;
+        match e {
+            E::Write { .. } | E::Encode { .. } => Self::job(e),
+            E::Content { .. } | E::Head(_) => Self::input(e),
+        }
+    }
+}
+
+impl From<rubor_assets::convert::ConvertError> for Failure {
+    fn from(e: rubor_assets::convert::ConvertError) -> Self {
+        Self::input(with_causes(&e))
+    }
+}
+
+impl From<ImageError> for Failure {
+    /// An image that was to be read; see [`crate::output::save_map`] for those that are written.
+    fn from(e: ImageError) -> Self {
+        Self::input(with_causes(&e))
+    }
+}
+
+impl From<rubor_renderer::settings::SettingsError> for Failure {
+    fn from(e: rubor_renderer::settings::SettingsError) -> Self {
+        Self::input(e)
+    }
+}
+
+impl From<RenderError> for Failure {
+    fn from(e: RenderError) -> Self {
+        match e {
+            RenderError::NoAdapter => Self::job(e).hint("`make demo` installs one on Debian and Ubuntu"),
+            RenderError::Device { .. } | RenderError::Lost(_) => Self::job(e),
+            _ => Self::input(e),
+        }
+    }
+}
+
+/// An error and what caused it, unless the cause is already in its words.
+pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(e) = cause {
+        let more = e.to_string();
+        if !text.contains(&more) {
+            text = format!("{text}: {more}");
+        }
+        cause = e.source();
+    }
+    text
+}

@@ -1,0 +1,178 @@
+//! Heads, rigs, sequences and lights: from files, or those built in.
+
+use std::path::{Path, PathBuf};
+
+use rubor_assets::{import, synthesize};
+use rubor_rig::expression::Rig;
+use rubor_rig::head::Head;
+use rubor_rig::lights::{LIGHT_RIGS, light_rig};
+use rubor_rig::timeline::Sequence;
+
+use crate::environment;
+use crate::error::{Failure, Outcome};
+use crate::job::{Fingerprint, InputFile, Lighting};
+use crate::notes::Note;
+
+/// The head that ships with rubor (see assets/README.md).
+const DEFAULT_HEAD: &[u8] = include_bytes!("../../assets/head.glb");
+
+/// A head with what its file carries.
+#[derive(Clone, Debug)]
+pub struct LoadedHead {
+    /// The head.
+    pub head: Head,
+    /// Its rig.
+    pub rig: Option<Rig>,
+    /// The sequence that its animation was made from.
+    pub sequence: Option<Sequence>,
+    /// What its animation holds.
+    pub animation: Option<Sequence>,
+    /// Where it comes from, and what the file held.
+    pub source: InputFile,
+}
+
+/// The head of a file (`.glb`, `.gltf`), or the built-in one.
+///
+/// # Errors
+/// A file that is missing or that is no head.
+pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
+    let name = path.unwrap_or(Path::new("built-in head"));
+    let bytes = match path {
+        None => std::borrow::Cow::Borrowed(DEFAULT_HEAD),
+        Some(path) => {
+            require_file(path, "a head (.glb or .gltf)")?;
+            std::fs::read(path).map_err(|e| Failure::read(path, e))?.into()
+        }
+    };
+    let imported = import::gltf::from_bytes(&bytes, name)?;
+    let rig = match imported.rig {
+        None => None,
+        Some(value) => {
+            let at = format!("{} (rig)", name.display());
+            Some(Rig::from_json(&at, &value.to_string())?)
+        }
+    };
+    let sequence = match imported.sequence {
+        None => None,
+        Some(value) => {
+            let at = format!("{} (sequence)", name.display());
+            Some(Sequence::from_json(&at, &value.to_string())?)
+        }
+    };
+    Ok(LoadedHead {
+        head: imported.head,
+        rig,
+        sequence,
+        animation: imported.animation,
+        source: InputFile { file: path.map(absolute).transpose()?, fingerprint: Fingerprint::of(&bytes) },
+    })
+}
+
+/// The rig of a file, else the head's own, else the default one for ARKit names.
+///
+/// # Errors
+/// A file that is missing or that is no rig.
+pub fn rig(path: Option<&Path>, of_head: Option<Rig>) -> Outcome<Rig> {
+    match (path, of_head) {
+        (Some(path), _) => {
+            require_file(path, "a rig (.json)")?;
+            Ok(Rig::load(path)?)
+        }
+        (None, Some(rig)) => Ok(rig),
+        (None, None) => Ok(Rig::default_rig()?),
+    }
+}
+
+/// The sequence of a file with the recording that it names, or the demo. The path of an environment is looked for in
+/// the folder of the sequence and then in the working folder.
+///
+/// # Errors
+/// A file that is missing or that is no sequence; a recording that does not load.
+pub fn sequence(path: Option<&Path>) -> Outcome<(Sequence, Vec<Note>)> {
+    let Some(path) = path else { return Ok((Sequence::demo()?, Vec::new())) };
+    require_file(path, "a sequence (.json)")?;
+    let mut sequence = Sequence::load(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut notes = Vec::new();
+    let about = path.display().to_string();
+    if let Some(report) = import::capture::load_into(&mut sequence, folder)? {
+        notes.extend(report.notes.iter().map(|note| Note::new(&about, format!("capture: {note}"))));
+        if !report.unmapped.is_empty() {
+            let names = report.unmapped.join(", ");
+            notes.push(Note::new(&about, format!("capture: no shape is known for {names}")));
+        }
+    }
+    find_environment(&mut sequence, folder)?;
+    Ok((sequence, notes))
+}
+
+/// A light rig by its name, or the lights of a sequence file.
+///
+/// # Errors
+/// Neither has that name.
+pub fn lights(name: &str) -> Outcome<Lighting> {
+    let path = Path::new(name);
+    let from = match light_rig(name) {
+        Some(rig) => rig?,
+        None if path.is_file() => {
+            let mut sequence = Sequence::load(path)?;
+            find_environment(&mut sequence, path.parent().unwrap_or(Path::new("")))?;
+            sequence
+        }
+        None => {
+            let names = LIGHT_RIGS.map(|r| r.0).join(", ");
+            return Err(Failure::input(format!(
+                "lights: found {name:?}, expected {names}, or a sequence file"
+            )));
+        }
+    };
+    Ok(Lighting { name: name.to_owned(), lights: from.lights, environment: from.environment })
+}
+
+/// A MakeHuman character with synthesised skin, with smaller maps than one that is worked with.
+///
+/// # Errors
+/// Data that are missing or broken.
+pub fn character(
+    character: &import::makehuman::Character,
+    data: &Path,
+    step: &(impl Fn() + Sync),
+) -> Outcome<LoadedHead> {
+    let mut options = character.head();
+    data.clone_into(&mut options.data);
+    let mut head = import::makehuman::import(&options)?;
+    let skin = synthesize::Options { resolution: CHARACTER_MAPS, ..character.skin() };
+    synthesize::synthesize_into_with(&mut head, &skin, step).map_err(Failure::input)?;
+    let source = InputFile { file: None, fingerprint: Fingerprint::of(character.name.as_bytes()) };
+    Ok(LoadedHead { head, rig: None, sequence: None, animation: None, source })
+}
+
+/// Side of the maps of a character, texels.
+const CHARACTER_MAPS: u32 = 1024;
+
+/// Makes the path of an environment absolute.
+fn find_environment(sequence: &mut Sequence, folder: &Path) -> Outcome {
+    let Some(environment) = &mut sequence.environment else { return Ok(()) };
+    if environment::is_built_in(&environment.name) {
+        return Ok(());
+    }
+    let beside = folder.join(&environment.name);
+    let found = if beside.is_file() { &beside } else { Path::new(&environment.name) };
+    if found.is_file() {
+        environment.name = absolute(found)?.to_string_lossy().into_owned();
+    }
+    Ok(())
+}
+
+/// A path that means the same in any folder.
+pub(crate) fn absolute(path: &Path) -> Outcome<PathBuf> {
+    std::path::absolute(path).map_err(|e| Failure::read(path, e))
+}
+
+fn require_file(path: &Path, expected: &str) -> Outcome {
+    if path.is_file() {
+        return Ok(());
+    }
+    let found = if path.is_dir() { "a folder" } else { "no such file" };
+    Err(Failure::input(format!("{}: found {found}, expected {expected}", path.display())))
+}

@@ -1,0 +1,92 @@
+//! GPU time of each pass, frames drawn back to back.
+//!
+//! ```text
+//! a shot --each settings--> warm-up, frames --timestamps--> median and spread of each pass
+//! ```
+
+use rubor_renderer::FrameTimes;
+use rubor_renderer::settings::Settings;
+use rubor_rig::evaluate::Shot;
+
+use super::names;
+use crate::error::{Failure, Outcome};
+use crate::report::{BenchReport, BenchRow, PassCost};
+use crate::studio::Studio;
+
+/// Frames of a measurement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    /// Those that are timed.
+    pub timed: u32,
+    /// Those before them, so that the clock of the device is up.
+    pub warm_up: u32,
+}
+
+/// Times a shot of the one head of a studio with each settings; `told` gets each row as soon as it is there.
+///
+/// # Errors
+/// A device without timestamps; what the studio refuses; what `told` returns.
+pub fn run(
+    studio: &mut Studio,
+    shot: &Shot,
+    all: &[Settings],
+    frames: Frames,
+    mut told: impl FnMut(&BenchRow, &mut Studio) -> Outcome,
+) -> Outcome<BenchReport> {
+    if !studio.has_timestamps() {
+        let name = studio.adapter().name;
+        return Err(Failure::job(format!("{name} has no timestamps, so passes cannot be timed")));
+    }
+    let mut rows = Vec::new();
+    for (settings, name) in all.iter().zip(names(all, &["scatter", "transmit", "antialias"])) {
+        let times = studio.measure(shot, settings, frames.warm_up, frames.timed)?;
+        let frame = summary("frame", 1, times.iter().map(|t| t.frame_ms).collect());
+        let row = BenchRow { name, settings: settings.clone(), frame, passes: passes(&times) };
+        told(&row, studio)?;
+        rows.push(row);
+    }
+    Ok(BenchReport { adapter: studio.adapter(), frames: frames.timed, warm_up: frames.warm_up, rows })
+}
+
+/// Passes of one name added up, in the order of their first run.
+fn passes(times: &[FrameTimes]) -> Vec<PassCost> {
+    let Some(first) = times.first() else { return Vec::new() };
+    let mut names: Vec<&'static str> = Vec::new();
+    for (name, _) in &first.passes_ms {
+        if !names.contains(name) {
+            names.push(name);
+        }
+    }
+    let of = |t: &FrameTimes, name: &str| -> Vec<f64> {
+        t.passes_ms.iter().filter(|(n, _)| *n == name).map(|(_, ms)| *ms).collect()
+    };
+    names
+        .into_iter()
+        .map(|name| {
+            summary(name, of(first, name).len(), times.iter().map(|t| of(t, name).iter().sum()).collect())
+        })
+        .collect()
+}
+
+fn summary(name: &str, runs: usize, mut ms: Vec<f64>) -> PassCost {
+    ms.sort_by(f64::total_cmp);
+    let at = |share: f64| ms.get(((ms.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(0.0);
+    PassCost { name: name.to_owned(), runs, median: at(0.5), p10: at(0.1), p90: at(0.9) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_a_pass_are_added_within_a_frame() {
+        let frame = |a: f64| FrameTimes {
+            passes_ms: vec![("shadow", a), ("shade", 5.0), ("shadow", 1.0)],
+            frame_ms: 9.0,
+        };
+        let costs = passes(&[frame(1.0), frame(2.0), frame(30.0)]);
+        let found: Vec<_> = costs.iter().map(|c| (c.name.as_str(), c.runs, c.median)).collect();
+        assert_eq!(found, [("shadow", 2, 3.0), ("shade", 1, 5.0)]);
+        assert_eq!(costs[0].p90, 31.0);
+    }
+}

@@ -1,0 +1,145 @@
+//! What work wants said although it goes on: what has no effect, was guessed or repaired.
+//!
+//! ```
+//! use rubor::notes::{Note, summed};
+//! let lacks = |name: &str| Note::new("head \"Ada\"", format!("the head has no shape {name:?}: it has no effect"));
+//! let lines = summed(&[lacks("jawOpen"), lacks("tongueOut")]);
+//! assert_eq!(lines, [r#"head "Ada": the head has no shape "jawOpen" and "tongueOut": it has no effect"#]);
+//! ```
+
+use std::fmt;
+
+/// One remark.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// The file or head that it is about; may be empty.
+    pub about: String,
+    /// Place in the file, ready to stand before the message; may be empty.
+    pub place: String,
+    /// What was found and what comes of it.
+    pub message: String,
+}
+
+/// Names that a summed note shows.
+const SHOWN_NAMES: usize = 3;
+
+impl Note {
+    /// A remark about a file or a head as a whole.
+    pub fn new(about: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { about: about.into(), place: String::new(), message: message.into() }
+    }
+
+    /// A remark of the rig about this head.
+    pub fn of_rig(about: impl Into<String>, note: &rubor_rig::error::Note) -> Self {
+        let hint = note.nearest.as_ref().map(|n| format!("; did you mean {n:?}?")).unwrap_or_default();
+        Self {
+            about: about.into(),
+            place: note.place.to_string(),
+            message: format!("{}{hint}", note.message),
+        }
+    }
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.about.is_empty() {
+            write!(f, "{}: ", self.about)?;
+        }
+        write!(f, "{}{}", self.place, self.message)
+    }
+}
+
+/// One line for all remarks of a kind: those about one thing whose messages differ in the first quoted name only.
+pub fn summed(notes: &[Note]) -> Vec<String> {
+    let parts: Vec<(&str, &str, &str)> = notes.iter().map(|n| split_name(&n.message)).collect();
+    let is_like = |a: usize, b: usize| {
+        let ((before_a, name_a, after_a), (before_b, name_b, after_b)) = (parts[a], parts[b]);
+        let same_place = notes[a].place == notes[b].place || !name_a.is_empty();
+        notes[a].about == notes[b].about
+            && same_place
+            && before_a == before_b
+            && after_a == after_b
+            && name_a.is_empty() == name_b.is_empty()
+    };
+    let mut lines = Vec::new();
+    for first in 0..notes.len() {
+        if (0..first).any(|earlier| is_like(earlier, first)) {
+            continue;
+        }
+        let mut names: Vec<&str> = Vec::new();
+        for other in (first..notes.len()).filter(|other| is_like(first, *other)) {
+            if !names.contains(&parts[other].1) {
+                names.push(parts[other].1);
+            }
+        }
+        let (before, _, after) = parts[first];
+        let message = format!("{before}{}{after}", listed(&names));
+        lines.push(Note { message, ..notes[first].clone() }.to_string());
+    }
+    lines
+}
+
+/// `"a"`, `"a" and "b"`, `"a", "b", "c" and 25 more (28 in all)`.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [rest @ .., last] if names.len() <= SHOWN_NAMES => format!("{} and {last}", rest.join(", ")),
+        _ => {
+            let more = names.len() - SHOWN_NAMES;
+            format!("{} and {more} more ({} in all)", names[..SHOWN_NAMES].join(", "), names.len())
+        }
+    }
+}
+
+/// What stands before the first quoted name, the name with its quotes, and what stands behind it.
+fn split_name(message: &str) -> (&str, &str, &str) {
+    let Some(start) = message.find('"') else { return (message, "", "") };
+    let mut is_escaped = false;
+    for (i, c) in message[start + 1..].char_indices() {
+        match c {
+            _ if is_escaped => is_escaped = false,
+            '\\' => is_escaped = true,
+            '"' => {
+                let end = start + i + 2;
+                return (&message[..start], &message[start..end], &message[end..]);
+            }
+            _ => {}
+        }
+    }
+    (message, "", "")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_of_one_kind_become_one_line_and_others_stay() {
+        let mut notes: Vec<Note> = (0..28)
+            .map(|i| Note {
+                about: "head \"x\"".into(),
+                place: format!("s.json:{i}:3: "),
+                message: format!("the head has no shape \"shape{i}\": it has no effect"),
+            })
+            .collect();
+        notes.insert(4, Note::new("head \"x\"", "the head has no wrinkle zones"));
+        notes.push(Note::new("head \"y\"", "the head has no shape \"shape1\": it has no effect"));
+        notes.push(notes[0].clone());
+        assert_eq!(
+            summed(&notes),
+            [
+                "head \"x\": s.json:0:3: the head has no shape \"shape0\", \"shape1\", \"shape2\" and 25 more (28 in all): \
+                 it has no effect",
+                "head \"x\": the head has no wrinkle zones",
+                "head \"y\": the head has no shape \"shape1\": it has no effect",
+            ]
+        );
+    }
+
+    #[test]
+    fn quotes_within_names_do_not_end_them() {
+        assert_eq!(split_name(r#"no shape "a \" b": x"#), ("no shape ", r#""a \" b""#, ": x"));
+        assert_eq!(split_name("an inch is 1\" long"), ("an inch is 1\" long", "", ""));
+    }
+}

@@ -1,0 +1,159 @@
+//! Writing files so that a stopped run leaves none half written.
+
+use std::path::Path;
+
+use rubor_assets::image_io::{ImageError, SampleKind};
+use rubor_renderer::channels::{Channel, ChannelData};
+use rubor_rig::map::Map;
+use serde::Serialize;
+
+use crate::error::{Failure, Outcome, with_causes};
+
+/// Creates a folder and its parents.
+///
+/// # Errors
+/// The system refuses.
+pub fn folder(path: &Path) -> Outcome {
+    std::fs::create_dir_all(path).map_err(|e| Failure::write(path, e))
+}
+
+/// Writes a file: all of it, or nothing.
+///
+/// # Errors
+/// The system refuses.
+pub fn write(path: &Path, bytes: &[u8]) -> Outcome {
+    commit(path, |partial| std::fs::write(partial, bytes))
+}
+
+/// Writes a value as JSON that people can read.
+///
+/// # Errors
+/// The system refuses.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Outcome {
+    let mut text = serde_json::to_vec_pretty(value).map_err(Failure::job)?;
+    text.push(b'\n');
+    write(path, &text)
+}
+
+/// Lets `make` fill a file of a temporary name in the same folder and then gives it its own. The temporary name has the
+/// same extension, for programs that choose a format by it.
+///
+/// # Errors
+/// The system refuses, or `make` fails; then nothing is left.
+pub fn commit(path: &Path, make: impl FnOnce(&Path) -> std::io::Result<()>) -> Outcome {
+    let failed = |e: std::io::Error| Failure::write(path, e);
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let suffix = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".partial-").suffix(&suffix);
+    // Temporary files are for their owner only; a result is as any other file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let partial = builder.tempfile_in(folder).map_err(failed)?.into_temp_path();
+    make(&partial).map_err(failed)?;
+    partial.persist(path).map_err(|e| failed(e.error))
+}
+
+/// Writes a picture; its name decides the format.
+///
+/// # Errors
+/// The system refuses, or no picture has such a name.
+pub fn save_picture(path: &Path, picture: &image::RgbImage) -> Outcome {
+    commit(path, |partial| picture.save(partial).map_err(std::io::Error::other))
+}
+
+/// Writes a map; its name decides the format.
+///
+/// # Errors
+/// The system refuses; a map or a kind of samples that the format does not have.
+pub fn save_map(path: &Path, map: &Map, kind: SampleKind) -> Outcome {
+    rubor_assets::image_io::save_image(path, map, kind).map_err(|e| match e {
+        ImageError::Io { source, .. } => Failure::write(path, source),
+        ImageError::Decode { .. } => Failure::job(with_causes(&e)),
+        _ => Failure::input(with_causes(&e)),
+    })
+}
+
+/// Writes a channel as OpenEXR under the names of its components; ids are whole numbers, all else are floats.
+///
+/// # Errors
+/// The system refuses.
+pub fn save_channel(path: &Path, data: &ChannelData) -> Outcome {
+    use exr::prelude::{
+        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
+    };
+    let names = data.channel.row().components;
+    let samples = |c: usize| {
+        let values = data.values.iter().skip(c).step_by(names.len());
+        match data.channel {
+            Channel::Ids => FlatSamples::U32(values.map(|v| v.to_bits()).collect()),
+            _ => FlatSamples::F32(values.copied().collect()),
+        }
+    };
+    let channels = (0..names.len()).map(|c| AnyChannel::new(names[c], samples(c))).collect();
+    let layer = Layer::new(
+        (data.size[0] as usize, data.size[1] as usize),
+        LayerAttributes::named(data.channel.name().as_str()),
+        Encoding::FAST_LOSSLESS,
+        AnyChannels::sort(channels),
+    );
+    let image = Image::from_layer(layer);
+    commit(path, |partial| image.write().to_file(partial).map_err(std::io::Error::other))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_nothing_and_is_no_fault_of_the_input() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let failed = commit(&path, |partial| {
+            assert_eq!(partial.extension(), path.extension());
+            std::fs::write(partial, b"half")?;
+            Err(std::io::Error::other("stopped"))
+        });
+        assert_eq!(failed.unwrap_err().exit_code(), 1);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        write(&path, b"whole").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"whole");
+        assert_eq!(write(&path.join("inside"), b"").unwrap_err().exit_code(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn results_may_be_read_by_whom_the_user_lets() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let [ours, plain] = ["ours", "plain"].map(|name| folder.path().join(name));
+        write(&ours, b"x").unwrap();
+        std::fs::write(&plain, b"x").unwrap();
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
+    }
+
+    #[test]
+    fn channels_keep_their_names_and_the_bits_of_ids() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ids.exr");
+        let bits = [7u32, 0xf000_0001];
+        let values = bits.iter().map(|b| f32::from_bits(*b)).collect();
+        save_channel(&path, &ChannelData { channel: Channel::Ids, size: [2, 1], values }).unwrap();
+        let read = exr::prelude::read_all_flat_layers_from_file(&path).unwrap();
+        let channel = &read.layer_data[0].channel_data.list[0];
+        assert_eq!(channel.name.to_string(), "id");
+        assert_eq!(channel.sample_data, exr::prelude::FlatSamples::U32(bits.to_vec()));
+        let path = folder.path().join("velocity.exr");
+        let values = vec![1.0, 2.0, 3.0, 4.0];
+        save_channel(&path, &ChannelData { channel: Channel::Velocity, size: [2, 1], values }).unwrap();
+        let read = exr::prelude::read_all_flat_layers_from_file(&path).unwrap();
+        let channels = &read.layer_data[0].channel_data.list;
+        let of =
+            |name: &str| channels.iter().find(|c| c.name.to_string() == name).unwrap().sample_data.clone();
+        assert_eq!(of("Y"), exr::prelude::FlatSamples::F32(vec![2.0, 4.0]));
+    }
+}

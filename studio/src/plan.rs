@@ -1,0 +1,160 @@
+//! A job that was checked against its heads: which frames there are, and drawing them in any order.
+//!
+//! ```text
+//! Job + heads --new--> Plan --shots--> shots of a frame
+//! frames to draw --draw--> device: n+1 | finish: n --> taker
+//! ```
+//!
+//! Frames do not depend on which others are drawn. Antialiasing over time mixes the light of the frame before into a
+//! frame, by the speeds of both, and the speed of the frame before comes from positions of the one before that. So where
+//! a frame does not follow the last one drawn, the two before it are drawn first, after a cut.
+
+use rubor_rig::evaluate::{Evaluator, Shot};
+use rubor_rig::head::Head;
+
+use crate::error::{Failure, Outcome};
+use crate::inputs::LoadedHead;
+use crate::job::Job;
+use crate::notes::Note;
+use crate::studio::{Frame, Studio};
+
+/// Share of the width of a head that is left free between two of them.
+const SPACING: f32 = 1.05;
+/// Frames before a frame that its pixels depend on, with antialiasing over time.
+const REMEMBERED_FRAMES: u32 = 2;
+
+/// A job that can be drawn.
+pub struct Plan<'a> {
+    job: &'a Job,
+    heads: &'a [LoadedHead],
+    evaluators: Vec<Evaluator>,
+    frames: Vec<u32>,
+    spacing_m: f32,
+    notes: Vec<Note>,
+}
+
+impl<'a> Plan<'a> {
+    /// Checks a job. The device is not needed.
+    ///
+    /// # Errors
+    /// No head; names that rig or head do not have; frames after the end of the sequence; settings out of range.
+    pub fn new(job: &'a Job, heads: &'a [LoadedHead]) -> Outcome<Self> {
+        job.settings.validate()?;
+        let sequence = job.lit_sequence();
+        let (mut evaluators, mut notes) = (Vec::new(), Vec::new());
+        for loaded in heads {
+            let (evaluator, found) = Evaluator::new(&loaded.head, &job.rig, &sequence)?;
+            let about = format!("head {:?}", loaded.head.name);
+            notes.extend(found.iter().map(|note| Note::of_rig(&about, note)));
+            evaluators.push(evaluator);
+        }
+        let Some(first) = evaluators.first() else { return Err(Failure::input("there is no head to draw")) };
+        let count = first.frame_count();
+        let frames = match &job.frames {
+            None => (0..count).collect(),
+            Some(list) => {
+                if let Some(last) = list.numbers().last().filter(|last| **last > count) {
+                    return Err(Failure::input(format!(
+                        "frames: found {last}, expected at most {count}, the length of the sequence"
+                    )));
+                }
+                list.numbers().iter().map(|n| n - 1).collect()
+            }
+        };
+        let spacing_m = heads.iter().map(|h| width(&h.head)).fold(0.0, f32::max) * SPACING;
+        Ok(Self { job, heads, evaluators, frames, spacing_m, notes })
+    }
+
+    /// The job.
+    pub fn job(&self) -> &'a Job {
+        self.job
+    }
+
+    /// Its heads.
+    pub fn heads(&self) -> &'a [LoadedHead] {
+        self.heads
+    }
+
+    /// Frames of the job by their index from 0, ascending.
+    pub fn frames(&self) -> &[u32] {
+        &self.frames
+    }
+
+    /// What has no effect.
+    pub fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+
+    /// Metres between the middles of two heads.
+    pub fn spacing_m(&self) -> f32 {
+        self.spacing_m
+    }
+
+    /// Shots of all heads at a frame, from the camera of the first; several heads are seen from further away.
+    pub fn shots(&self, frame: u32) -> Vec<Shot> {
+        let mut shots: Vec<Shot> = self.evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
+        let n = shots.len() as f32;
+        if let Some(Shot { camera, .. }) = shots.first_mut() {
+            camera.position = camera.target + (camera.position - camera.target) * n;
+        }
+        shots
+    }
+
+    /// Puts the heads into a studio, in place of those before.
+    ///
+    /// # Errors
+    /// A head does not fit the device.
+    pub fn enter(&self, studio: &mut Studio) -> Outcome {
+        studio.set_heads(self.heads.iter().map(|h| &h.head))
+    }
+
+    /// Draws frames in the order given, each with the pixels that it has in the whole run. `take` gets them one by one,
+    /// while the device works on the next. The heads have to be in the studio: see [`Plan::enter`].
+    ///
+    /// # Errors
+    /// What the studio refuses; what `take` returns.
+    pub fn draw(
+        &self,
+        studio: &mut Studio,
+        frames: &[u32],
+        mut take: impl FnMut(Shown) -> Outcome,
+    ) -> Outcome {
+        let settings = &self.job.settings;
+        let before = if settings.quality.antialias.is_temporal() { REMEMBERED_FRAMES } else { 0 };
+        let mut last = None;
+        let mut waiting = None;
+        for &frame in frames {
+            if last.is_none_or(|last: u32| last.checked_add(1) != Some(frame)) {
+                let start = frame.saturating_sub(before);
+                studio.cut(start);
+                for earlier in start..frame {
+                    studio.draw(&self.shots(earlier), self.spacing_m, settings)?;
+                }
+            }
+            last = Some(frame);
+            let shots = self.shots(frame);
+            let drawn = studio.draw(&shots, self.spacing_m, settings)?;
+            if let Some((frame, shots, drawn)) = waiting.replace((frame, shots, drawn)) {
+                take(Shown { frame, shots, drawn: studio.finish(drawn)? })?;
+            }
+        }
+        match waiting {
+            Some((frame, shots, drawn)) => take(Shown { frame, shots, drawn: studio.finish(drawn)? }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A frame of a plan.
+pub struct Shown {
+    /// Index from 0.
+    pub frame: u32,
+    /// What it shows.
+    pub shots: Vec<Shot>,
+    /// The finished frame.
+    pub drawn: Frame,
+}
+
+fn width(head: &Head) -> f32 {
+    head.bounds().map_or(0.0, |(low, high)| high.x - low.x)
+}

@@ -1,0 +1,66 @@
+//! A sequence at a glance: some of its frames, evenly spaced, on one page.
+
+use image::RgbImage;
+use image::imageops::{FilterType, resize};
+
+/// Frames on a page.
+const MOST: usize = 48;
+/// Frames in a row.
+const COLUMNS: u32 = 8;
+/// Width of a small frame, pixels.
+const WIDTH: u32 = 200;
+const GAP: u32 = 4;
+
+/// Which frames of `count` stand on the page, ascending.
+pub fn choose(count: u32) -> Vec<u32> {
+    let n = (count as usize).min(MOST);
+    (0..n).map(|i| (i * count as usize / n.max(1)) as u32).collect()
+}
+
+/// A frame at the size of the page.
+pub fn reduce(frame: &RgbImage) -> RgbImage {
+    let height = (WIDTH * frame.height() / frame.width().max(1)).max(1);
+    resize(frame, WIDTH, height, FilterType::Triangle)
+}
+
+/// The page of reduced frames of one size.
+pub fn page(frames: &[RgbImage]) -> RgbImage {
+    page_of(frames, COLUMNS)
+}
+
+/// Pictures of one size in rows of up to `columns`.
+pub fn page_of(frames: &[RgbImage], columns: u32) -> RgbImage {
+    let (w, h) = frames.first().map_or((1, 1), RgbImage::dimensions);
+    let columns = columns.min(frames.len() as u32).max(1);
+    let rows = (frames.len() as u32).div_ceil(columns).max(1);
+    let mut page =
+        RgbImage::from_pixel(columns * (w + GAP) + GAP, rows * (h + GAP) + GAP, image::Rgb([24, 24, 26]));
+    for (i, frame) in frames.iter().enumerate() {
+        let (x, y) = (i as u32 % columns, i as u32 / columns);
+        let place = |n: u32, step: u32| i64::from(GAP + n * (step + GAP));
+        image::imageops::replace(&mut page, frame, place(x, w), place(y, h));
+    }
+    page
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_sequences_show_every_frame_and_long_ones_the_same_number() {
+        assert_eq!(choose(3), [0, 1, 2]);
+        let many = choose(1000);
+        assert_eq!(many.len(), MOST);
+        assert_eq!(many[0], 0);
+        assert!(many.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    #[test]
+    fn a_page_holds_its_frames() {
+        let page = page(&vec![RgbImage::from_pixel(20, 10, image::Rgb([255, 0, 0])); 9]);
+        assert_eq!(page.dimensions(), (8 * 24 + 4, 2 * 14 + 4));
+        assert_eq!(page.get_pixel(4, 18).0, [255, 0, 0]);
+        assert_eq!(page.get_pixel(28, 18).0, [24, 24, 26]);
+    }
+}

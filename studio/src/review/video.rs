@@ -1,0 +1,51 @@
+//! Frames to an MP4 by way of the ffmpeg program, where there is one.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use crate::error::{Failure, Outcome};
+use crate::output;
+
+/// What came of it.
+pub enum Video {
+    /// The file is there.
+    Written,
+    /// There is no ffmpeg on this machine.
+    NoEncoder,
+}
+
+/// Encodes `frame.0001.png ...` of a folder. H.264, yuv420p, Rec. 709 with sRGB transfer, playable while it loads.
+///
+/// # Errors
+/// The program fails, or the file cannot be written.
+pub fn encode(folder: &Path, first: u32, fps: f64, path: &Path) -> Outcome<Video> {
+    let available =
+        Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    if !available.is_ok_and(|s| s.success()) {
+        return Ok(Video::NoEncoder);
+    }
+    let mut said = String::new();
+    let written = output::commit(path, |partial| {
+        let output = Command::new("ffmpeg")
+            .args(["-y", "-loglevel", "error", "-start_number", &first.to_string()])
+            .args(["-framerate", &fps.to_string(), "-i"])
+            .arg(folder.join("frame.%04d.png"))
+            // yuv420p wants even sides.
+            .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv"])
+            .args(["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p"])
+            .args(["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1"])
+            .args(["-movflags", "+faststart"])
+            .arg(partial)
+            .output()?;
+        if output.status.success() {
+            return Ok(());
+        }
+        said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        Err(std::io::Error::other("ffmpeg failed"))
+    });
+    match written {
+        Ok(()) => Ok(Video::Written),
+        Err(_) if !said.is_empty() => Err(Failure::job(format!("{}: ffmpeg said: {said}", path.display()))),
+        Err(failure) => Err(failure),
+    }
+}

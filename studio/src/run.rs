@@ -1,0 +1,244 @@
+//! The main job: the frames of a plan to a folder, with everything that a review needs beside them.
+//!
+//! ```text
+//! Plan --draw--> frame n+1 | writers: frame n --> frame.0001.png ...
+//!                                        +--> contact_sheet.png, video.mp4
+//! heads --------> animated_head.glb      job.json, stats.json
+//! ```
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use image::RgbImage;
+use rubor_assets::export;
+use rubor_renderer::footprint;
+
+use crate::error::{Failure, Outcome};
+use crate::job::{FrameList, Job};
+use crate::notes::{Note, summed};
+use crate::output;
+use crate::plan::{Plan, Shown};
+use crate::report::{JobReport, PassTimes, Report, median};
+use crate::review::inset::Inset;
+use crate::review::{contact_sheet, video};
+use crate::studio::{Frame, Studio};
+use crate::watch::Watch;
+use crate::writers;
+
+/// Name of the job in the folder of a run.
+pub const JOB_FILE: &str = "job.json";
+/// Name of the report.
+pub const STATS_FILE: &str = "stats.json";
+/// Name of the contact sheet.
+pub const SHEET_FILE: &str = "contact_sheet.png";
+/// Name of the video.
+pub const VIDEO_FILE: &str = "video.mp4";
+/// Name of the animated head.
+pub const HEAD_FILE: &str = "animated_head.glb";
+
+/// Where results go, and which.
+#[derive(Clone, Debug)]
+pub struct Destination {
+    /// The folder; made if missing.
+    pub folder: PathBuf,
+    /// Keep the frames that a stopped run of the same job left.
+    pub resume: bool,
+    /// Make a video, if the job has all frames.
+    pub video: bool,
+    /// Write the first head with its performance.
+    pub animated_head: bool,
+}
+
+impl Destination {
+    /// Everything into a folder, all of it new.
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into(), resume: false, video: true, animated_head: true }
+    }
+}
+
+/// A frame as the writers see it.
+struct Page {
+    place: usize,
+    shown: Shown,
+}
+
+/// What the writers made of it.
+struct Written {
+    place: usize,
+    small: Option<RgbImage>,
+}
+
+/// Draws a plan into a folder.
+///
+/// # Errors
+/// The folder holds the frames of another job; what the studio refuses; files that cannot be written.
+pub fn run(
+    plan: &Plan<'_>,
+    studio: &mut Studio,
+    to: &Destination,
+    watch: &mut dyn Watch,
+) -> Outcome<JobReport> {
+    let started = Instant::now();
+    watch.notes(plan.notes());
+    let (job, heads) = (plan.job(), plan.heads());
+    let inset = job.inset.zip(heads.first()).map(|(map, head)| Inset::new(map, &head.head)).transpose()?;
+    output::folder(&to.folder)?;
+    let is_new = claim_folder(job, to)?;
+    let size = job.settings.output.size;
+    plan.enter(studio)?;
+
+    let on_sheet = contact_sheet::choose(plan.frames().len() as u32);
+    let mut sheet: BTreeMap<usize, RgbImage> = BTreeMap::new();
+    let mut to_draw = Vec::new();
+    watch.begin("frames", plan.frames().len() as u64);
+    for (place, frame) in plan.frames().iter().copied().enumerate() {
+        let kept = if is_new { None } else { read_frame(job, &to.folder, frame, size) };
+        match kept {
+            Some(picture) => {
+                if on_sheet.contains(&(place as u32)) {
+                    sheet.insert(place, contact_sheet::reduce(&picture));
+                }
+                watch.step();
+            }
+            None => to_draw.push(frame),
+        }
+    }
+
+    let mut times = PassTimes::default();
+    let mut first_frame_s = None;
+    let mut seconds = Vec::new();
+    let write = |page: Page| -> Outcome<Written> {
+        let Page { place, shown: Shown { frame, shots, drawn } } = page;
+        let mut picture = drawn.picture();
+        if let (Some(inset), Some(shot)) = (&inset, shots.first()) {
+            inset.draw(&shot.face, &job.settings.quality, &mut picture);
+        }
+        save_channels(&to.folder, frame, &drawn)?;
+        // Last: a frame whose picture is there is whole.
+        output::save_picture(&frame_path(&to.folder, frame), &picture)?;
+        let small = on_sheet.contains(&(place as u32)).then(|| contact_sheet::reduce(&picture));
+        Ok(Written { place, small })
+    };
+    let mut written = |written: Written| {
+        first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
+        sheet.extend(written.small.map(|small| (written.place, small)));
+        watch.step();
+    };
+    writers::beside(&write, &mut written, |push| {
+        let mut since = Instant::now();
+        plan.draw(studio, &to_draw, |shown| {
+            seconds.push(since.elapsed().as_secs_f64());
+            since = Instant::now();
+            times.add(&shown.drawn.stats);
+            let place = plan.frames().partition_point(|f| *f < shown.frame);
+            push(Page { place, shown })
+        })
+    })?;
+    watch.end();
+
+    let mut notes = plan.notes().to_vec();
+    let mut files = vec![PathBuf::from(SHEET_FILE)];
+    let small: Vec<RgbImage> = sheet.into_values().collect();
+    output::save_picture(&to.folder.join(SHEET_FILE), &contact_sheet::page(&small))?;
+    if to.video && job.frames.is_none() {
+        match video::encode(&to.folder, 1, job.sequence.fps, &to.folder.join(VIDEO_FILE))? {
+            video::Video::Written => files.push(VIDEO_FILE.into()),
+            video::Video::NoEncoder => {
+                let message = "no video: the program ffmpeg is not on this machine (Debian, Ubuntu: ffmpeg)";
+                let note = Note::new("", message);
+                watch.notes(std::slice::from_ref(&note));
+                notes.push(note);
+            }
+        }
+    }
+    if to.animated_head {
+        export_animated(plan, &to.folder)?;
+        files.push(HEAD_FILE.into());
+    }
+    let report = JobReport {
+        adapter: studio.adapter(),
+        settings: job.settings.clone(),
+        frames: plan.frames().len(),
+        frames_drawn: to_draw.len(),
+        seconds_to_first_frame: first_frame_s,
+        seconds_per_frame: median(&mut seconds),
+        gpu_milliseconds_per_pass: times.medians(),
+        triangles: times.triangles,
+        device_memory_bytes: times.memory_bytes,
+        map_textures: heads
+            .first()
+            .map(|h| footprint::of_maps(&h.head.maps).into_iter().map(Into::into).collect())
+            .unwrap_or_default(),
+        files,
+        notes: summed(&notes),
+    };
+    output::write_json(&to.folder.join(STATS_FILE), &Report::Job(report.clone()))?;
+    Ok(report)
+}
+
+/// Writes down what job the folder holds. False where a stopped run of the same job goes on: the folder then holds the
+/// frames of both.
+fn claim_folder(job: &Job, to: &Destination) -> Outcome<bool> {
+    let path = to.folder.join(JOB_FILE);
+    if !to.resume || !path.is_file() {
+        job.write(&path)?;
+        return Ok(true);
+    }
+    let before = Job::read(&path, None)?;
+    if !before.draws_like(job)? {
+        return Err(Failure::input(format!(
+            "{}: found the frames of another job, expected those of this one",
+            to.folder.display()
+        ))
+        .hint("leave out --resume to draw all frames again, or choose another folder"));
+    }
+    let both =
+        before.frames.as_ref().zip(job.frames.as_ref()).map(|(a, b): (&FrameList, &FrameList)| a.and(b));
+    if both != before.frames {
+        Job { frames: both, ..job.clone() }.write(&path)?;
+    }
+    Ok(false)
+}
+
+/// The picture of a frame, from 0; files are numbered from 1.
+pub fn frame_path(folder: &Path, frame: u32) -> PathBuf {
+    folder.join(format!("frame.{:04}.png", frame + 1))
+}
+
+/// The file of a channel of a frame, from 0; files are numbered from 1.
+pub fn channel_path(folder: &Path, frame: u32, channel: &str) -> PathBuf {
+    folder.join(format!("frame.{:04}.{channel}.exr", frame + 1))
+}
+
+/// A frame that is there with all its channels, whole and of the right size.
+fn read_frame(job: &Job, folder: &Path, frame: u32, size: [u32; 2]) -> Option<RgbImage> {
+    let mut channels = job.settings.output.channels.iter();
+    if channels.any(|c| !channel_path(folder, frame, &c.name()).is_file()) {
+        return None;
+    }
+    let image = image::open(frame_path(folder, frame)).ok()?.into_rgb8();
+    (image.dimensions() == (size[0], size[1])).then_some(image)
+}
+
+fn save_channels(folder: &Path, frame: u32, drawn: &Frame) -> Outcome {
+    drawn
+        .channels
+        .iter()
+        .try_for_each(|data| output::save_channel(&channel_path(folder, frame, &data.channel.name()), data))
+}
+
+/// Writes the (first) head with its performance.
+fn export_animated(plan: &Plan<'_>, folder: &Path) -> Outcome {
+    let Some(loaded) = plan.heads().first() else { return Ok(()) };
+    let sequence = plan.job().lit_sequence();
+    let options = export::gltf::Options {
+        rig: Some(&plan.job().rig),
+        sequence: Some(&sequence),
+        shape_colors: true,
+        ..export::gltf::Options::default()
+    };
+    // What has no effect on the head was said before the first frame.
+    export::gltf::write(&loaded.head, &options, &folder.join(HEAD_FILE))?;
+    Ok(())
+}

@@ -1,0 +1,127 @@
+//! Frames do not depend on which others are drawn, in which order, and by how many processes.
+
+use rubor::inputs::{self, LoadedHead};
+use rubor::job::FrameList;
+use rubor::studio::adapters;
+use rubor::{Destination, Job, Plan, Studio, run};
+use rubor_renderer::settings::AntialiasMethod;
+use rubor_rig::timeline::Sequence;
+
+/// A head that turns, talks and flushes under light that turns with every frame, seen by a camera that moves.
+const MOVING: &str = r#"{ "fps": 12, "duration": 0.5,
+    "expressions": { "joy": [{ "t": 0, "v": 0 }, { "t": 0.5, "v": 1 }] },
+    "states": { "blush": [{ "t": 0, "v": 0 }, { "t": 0.5, "v": 1 }] },
+    "shapes": { "jawOpen": [{ "t": 0, "v": 0 }, { "t": 0.2, "v": 0.8, "ease": "smooth" }, { "t": 0.5, "v": 0 }] },
+    "head": { "yawDegrees": [{ "t": 0, "v": -20, "ease": "easeIn" }, { "t": 0.5, "v": 25 }],
+              "translation": [{ "t": 0, "v": [0, 0, 0] }, { "t": 0.3, "v": [0.02, 0, 0] }] },
+    "camera": { "framing": "close", "orbitDegrees": [{ "t": 0, "v": 0 }, { "t": 0.5, "v": 9 }] },
+    "environment": { "name": "studio", "rotationDegrees": [{ "t": 0, "v": 0.4 }, { "t": 0.5, "v": 3.1 }] } }"#;
+
+fn can_draw() -> bool {
+    let found = !adapters().is_empty();
+    assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
+    if !found {
+        eprintln!("SKIPPED: no graphics adapter");
+    }
+    found
+}
+
+fn moving_job(heads: &[LoadedHead], antialias: AntialiasMethod) -> Job {
+    let sequence = Sequence::from_json("moving.json", MOVING).expect("a sequence");
+    let rig = inputs::rig(None, heads[0].rig.clone()).expect("a rig");
+    let mut job = Job::new(heads, rig, sequence).expect("a job");
+    job.settings.output.size = [64, 48];
+    job.settings.quality.antialias = antialias;
+    job.settings.quality.shadow_size = 128;
+    job
+}
+
+/// The bytes of frames, in the order in which they are drawn.
+fn drawn(plan: &Plan<'_>, studio: &mut Studio, frames: &[u32]) -> Vec<(u32, Vec<u8>)> {
+    let mut all = Vec::new();
+    plan.draw(studio, frames, |shown| {
+        all.push((shown.frame, shown.drawn.image.rgba));
+        Ok(())
+    })
+    .expect("frames");
+    all
+}
+
+#[test]
+fn every_order_gives_the_bytes_of_the_whole_run() {
+    if !can_draw() {
+        return;
+    }
+    let heads = [inputs::head(None).expect("the built-in head")];
+    let mut studio = Studio::open(None).expect("a device");
+    let mut other = Studio::open(None).expect("a device");
+    for studio in [&mut studio, &mut other] {
+        studio.set_heads([&heads[0].head]).expect("the head fits");
+    }
+    for antialias in AntialiasMethod::all() {
+        let job = moving_job(&heads, antialias);
+        let plan = Plan::new(&job, &heads).expect("a plan");
+        let whole = drawn(&plan, &mut studio, plan.frames());
+        assert_eq!(whole.len(), 6);
+        let pictures: std::collections::BTreeSet<_> = whole.iter().map(|(_, bytes)| bytes).collect();
+        assert_eq!(pictures.len(), 6, "{antialias}: something moves in every frame");
+        let same = |found: Vec<(u32, Vec<u8>)>, how: &str| {
+            for (frame, bytes) in found {
+                let most = bytes.iter().zip(&whole[frame as usize].1).map(|(a, b)| a.abs_diff(*b)).max();
+                assert_eq!(most, Some(0), "{antialias}, frame {frame}, {how}");
+            }
+        };
+        same(drawn(&plan, &mut studio, &[5, 4, 3, 2, 1, 0]), "in reverse");
+        if antialias.is_temporal() {
+            for frame in 0..6 {
+                same(drawn(&plan, &mut other, &[frame]), "alone, on another device");
+            }
+            same(drawn(&plan, &mut studio, &[0, 1, 4, 5, 2, 2]), "with gaps and a frame twice");
+        } else {
+            same(drawn(&plan, &mut other, &[4, 1]), "on another device");
+        }
+    }
+}
+
+#[test]
+fn parts_and_resumed_runs_make_the_same_files() {
+    if !can_draw() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let heads = [inputs::head(None).expect("the built-in head")];
+    let mut job = moving_job(&heads, AntialiasMethod::Smaa4x);
+    job.settings.output.channels = vec![rubor_renderer::channels::Channel::Velocity];
+    let run = |job: &Job, name: &str, resume: bool| {
+        let plan = Plan::new(job, &heads).expect("a plan");
+        let folder = folder.path().join(name);
+        let to = Destination { resume, video: false, animated_head: false, ..Destination::new(folder) };
+        // A device of its own, as another process has.
+        run::run(&plan, &mut Studio::open(None).expect("a device"), &to, &mut ()).expect("a run")
+    };
+    let read = |folder_name: &str, file: &str| {
+        std::fs::read(folder.path().join(folder_name).join(file)).unwrap_or_else(|e| panic!("{file}: {e}"))
+    };
+    assert_eq!(run(&job, "whole", false).frames_drawn, 6);
+    let part =
+        |frames: &str| Job { frames: Some(frames.parse::<FrameList>().expect("a list")), ..job.clone() };
+    run(&part("3,6"), "parts", false);
+    assert_eq!(run(&part("1,3"), "parts", true).frames_drawn, 1);
+    let stored = Job::read(&folder.path().join("parts/job.json"), None).expect("a job");
+    assert_eq!(stored, part("1,3,6"), "the folder holds the frames of both");
+    std::fs::write(folder.path().join("parts/frame.0003.png"), b"half").expect("a broken frame");
+    std::fs::remove_file(folder.path().join("parts/frame.0006.velocity.exr")).expect("a lost channel");
+    assert_eq!(run(&job, "parts", true).frames_drawn, 5);
+    for file in ["job.json", "contact_sheet.png"] {
+        assert!(read("whole", file) == read("parts", file), "{file}");
+    }
+    for frame in 1..=6 {
+        for kind in ["png", "velocity.exr"] {
+            let file = format!("frame.{frame:04}.{kind}");
+            assert!(read("whole", &file) == read("parts", &file), "{file}");
+        }
+    }
+    let names = std::fs::read_dir(folder.path().join("parts")).expect("a folder");
+    let names: Vec<_> = names.map(|e| e.expect("a file").file_name()).collect();
+    assert!(!names.iter().any(|n| n.to_string_lossy().contains("partial")), "{names:?}");
+}
