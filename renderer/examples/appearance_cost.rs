@@ -8,7 +8,7 @@ use glam::{Mat4, Vec2, Vec3};
 use rubor_renderer::settings::{
     AntialiasMethod, Look, Output, Quality, ScatterMethod, Settings, TransmitMethod,
 };
-use rubor_renderer::{Camera, ColorTable, Gpu, HeadInstance, HeadOnGpu, RenderError, Renderer, Scene};
+use rubor_renderer::{Camera, ColorTable, HeadInstance, HeadOnGpu, RenderError, Renderer, Scene, native};
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
 use rubor_rig::map::Map;
@@ -16,7 +16,7 @@ use rubor_rig::map::Map;
 const FRAMES: usize = 21;
 
 fn main() -> Result<(), RenderError> {
-    let gpu = Gpu::new(std::env::args().nth(1).as_deref())?;
+    let gpu = native::open(std::env::args().nth(1).as_deref())?;
     println!("{}, {}", gpu.info.name, gpu.info.driver_info);
     let mut renderer = Renderer::new(gpu)?;
     let none = cost(&mut renderer, 0, 0)?;
@@ -42,6 +42,7 @@ fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<[
     let head = head(distributions, zones);
     let table = ColorTable { width: 2, height: 2, texels: &[[0.5; 3]; 4] };
     let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &table)?;
+    let gpu = renderer.gpu().clone();
     let mut state = FaceState::neutral(&head);
     state.distributions.fill(1.0 / distributions.max(1) as f32);
     state.zones.fill(0.5);
@@ -69,7 +70,7 @@ fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<[
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     for _ in 0..FRAMES {
         let start = std::time::Instant::now();
-        let (_, stats) = render(renderer, &scene, &settings)?;
+        let (_, stats) = native::wait(&gpu, renderer.render(&scene, &settings))?;
         frames.push(1e3 * start.elapsed().as_secs_f64());
         times.extend(stats.passes_ms.iter().filter(|(name, _)| *name == "appearance").map(|(_, ms)| *ms));
     }

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use serde::Serialize;
 
 use crate::channels::{Channel, ChannelData};
-use crate::device::readback::TextureReadback;
+use crate::device::readback::{Readback, TextureReadback};
 use crate::device::{FrameTimes, Gpu, Image as FrameImage, Images, PassTimer, PendingTimes, Recorder};
 use crate::error::RenderError;
 use crate::frame::{Frame, Passes, Past, realtime, reference};
@@ -67,6 +67,39 @@ pub struct Drawn {
     picture: TextureReadback,
     times: PendingTimes,
     stats: FrameStats,
+    channels: Vec<(Channel, Copy)>,
+}
+
+/// Numbers of a channel on their way to the host.
+enum Copy {
+    Image(TextureReadback, wgpu::TextureFormat),
+    Buffer(Readback),
+}
+
+impl Copy {
+    async fn read(self, channel: Channel) -> Result<ChannelData, RenderError> {
+        match self {
+            Self::Image(texels, format) => {
+                let size = texels.size;
+                let bytes = texels.read().await?;
+                let values = match format {
+                    wgpu::TextureFormat::Rgba16Float => {
+                        let texels: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+                        let n = channel.row().components.len();
+                        texels.iter().flat_map(|t| t[..n].iter().map(|v| v.to_f32())).collect()
+                    }
+                    _ => bytemuck::pod_collect_to_vec(&bytes),
+                };
+                Ok(ChannelData { channel, size, values })
+            }
+            Self::Buffer(floats) => {
+                let bytes = floats.read().await?;
+                let values = of_points(channel, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
+                let count = values.len() / channel.row().components.len();
+                Ok(ChannelData { channel, size: [count as u32, 1], values })
+            }
+        }
+    }
 }
 
 impl Drawn {
@@ -75,12 +108,25 @@ impl Drawn {
     /// # Errors
     /// The device failed.
     pub async fn finish(self) -> Result<(Image, FrameStats), RenderError> {
+        let (image, stats, _) = self.finish_with_channels().await?;
+        Ok((image, stats))
+    }
+
+    /// The same with the channels that the settings name, as far as the frame has them, in that order.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub async fn finish_with_channels(self) -> Result<(Image, FrameStats, Vec<ChannelData>), RenderError> {
         self.gpu.wants(self.submission);
         let [width, height] = self.picture.size;
         let rgba = self.picture.read().await?;
         let passes_ms = self.times.read().await?.passes_ms;
+        let mut channels = Vec::new();
+        for (channel, copy) in self.channels {
+            channels.push(copy.read(channel).await?);
+        }
         self.gpu.check()?;
-        Ok((Image { width, height, rgba }, FrameStats { passes_ms, ..self.stats }))
+        Ok((Image { width, height, rgba }, FrameStats { passes_ms, ..self.stats }, channels))
     }
 }
 
@@ -156,7 +202,7 @@ impl Renderer {
         self.prepare(scene, settings)?;
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let image = self.record_frame(&mut encoder, scene, settings, None)?;
-        self.hand_over(encoder, scene, image, None)
+        self.hand_over(encoder, scene, settings, image, None)
     }
 
     /// Draws a scene with any method. Frames follow one another until [`Renderer::cut`].
@@ -168,8 +214,16 @@ impl Renderer {
         scene: &Scene<'_>,
         settings: &Settings,
     ) -> Result<(Image, FrameStats), RenderError> {
+        self.draw_any(scene, settings).await?.finish().await
+    }
+
+    /// As [`Renderer::draw`], with any method: one that needs samples of the surface waits for the device between them.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub async fn draw_any(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<Drawn, RenderError> {
         let ScatterMethod::ReferenceSurface(batches) = settings.quality.scatter else {
-            return self.draw(scene, settings)?.finish().await;
+            return self.draw(scene, settings);
         };
         self.prepare(scene, settings)?;
         self.passes.shade.prepare_samples(&self.gpu);
@@ -186,7 +240,7 @@ impl Renderer {
             frame(&self.passes, scene, settings, &self.instances, &mut self.past, surface::NEEDS, None);
         let (image, noise) = reference::draw(&mut r, &mut frame, batches).await?;
         self.kept = frame.kept;
-        self.hand_over(encoder, scene, image, noise)?.finish().await
+        self.hand_over(encoder, scene, settings, image, noise)
     }
 
     /// Draws a scene `frames` times, one frame right after the other and without reading any picture, and says what each
@@ -241,30 +295,28 @@ impl Renderer {
     /// # Errors
     /// The device failed.
     pub async fn read(&self, channel: Channel) -> Result<ChannelData, RenderError> {
-        let buffer = match (channel, self.instances.first()) {
-            (Channel::Positions | Channel::Visibility, Some(instance)) => Some(&instance.positions),
-            (Channel::TangentFrames, Some(instance)) => Some(&instance.tangent_frames),
-            _ => None,
-        };
-        if let Some(buffer) = buffer {
-            let bytes = self.gpu.read_buffer(buffer).await?;
-            let values = of_points(channel, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
-            let count = values.len() / channel.row().components.len();
-            return Ok(ChannelData { channel, size: [count as u32, 1], values });
-        }
-        let Some(image) = self.kept.get(&channel) else {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let Some(copy) = self.copy(&mut encoder, channel) else {
             return Ok(ChannelData { channel, size: [0, 0], values: Vec::new() });
         };
-        let bytes = self.gpu.read_texture(image.texture()).await?;
-        let values = match image.texture().format() {
-            wgpu::TextureFormat::Rgba16Float => {
-                let texels: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
-                let n = channel.row().components.len();
-                texels.iter().flat_map(|t| t[..n].iter().map(|v| v.to_f32())).collect()
-            }
-            _ => bytemuck::pod_collect_to_vec(&bytes),
-        };
-        Ok(ChannelData { channel, size: image.size(), values })
+        self.gpu.queue.submit([encoder.finish()]);
+        let data = copy.read(channel).await?;
+        self.gpu.check()?;
+        Ok(data)
+    }
+
+    /// Copies a channel of the last frame, if that has it.
+    fn copy(&self, encoder: &mut wgpu::CommandEncoder, channel: Channel) -> Option<Copy> {
+        let of_head =
+            |buffer: &wgpu::Buffer| Copy::Buffer(Readback::of_buffer(&self.gpu, &mut *encoder, buffer));
+        match (channel, self.instances.first()) {
+            (Channel::Positions | Channel::Visibility, head) => head.map(|h| &h.positions).map(of_head),
+            (Channel::TangentFrames, head) => head.map(|h| &h.tangent_frames).map(of_head),
+            _ => self.kept.get(&channel).map(|image| {
+                let texture = image.texture();
+                Copy::Image(TextureReadback::new(&self.gpu, encoder, texture), texture.format())
+            }),
+        }
     }
 
     /// Checks a scene and makes what its frames need.
@@ -324,11 +376,14 @@ impl Renderer {
         &mut self,
         mut encoder: wgpu::CommandEncoder,
         scene: &Scene<'_>,
+        settings: &Settings,
         image: Option<FrameImage>,
         scatter_noise: Option<f64>,
     ) -> Result<Drawn, RenderError> {
         let Some(image) = image else { return Err(RenderError::Lost("no picture".into())) };
         let picture = TextureReadback::new(&self.gpu, &mut encoder, image.texture());
+        let channels = settings.output.channels.iter();
+        let channels = channels.filter_map(|c| Some((*c, self.copy(&mut encoder, *c)?))).collect();
         let times = self.timer.finish(&self.gpu, &mut encoder);
         let submission = self.gpu.queue.submit([encoder.finish()]);
         let triangles = |h: &crate::scene::HeadInstance<'_>| {
@@ -340,7 +395,7 @@ impl Renderer {
             memory_bytes: self.memory_bytes(scene),
             scatter_noise,
         };
-        Ok(Drawn { gpu: self.gpu.clone(), submission, picture, times, stats })
+        Ok(Drawn { gpu: self.gpu.clone(), submission, picture, times, stats, channels })
     }
 
     /// Bytes of heads, buffers and images.

@@ -2,19 +2,21 @@
 
 use std::path::Path;
 
-use glam::Vec3;
-use rubor_assets::image_io::{SampleKind, load_image};
+use rubor_assets::environment;
+use rubor_assets::image_io::ReadOptions;
 use rubor_renderer::EnvironmentMap;
 
 use crate::error::{Failure, Outcome};
+use crate::notes::Note;
 
-/// A built-in environment, or the equirectangular radiance of a file (`.exr`, `.hdr`).
+/// A built-in environment, or the equirectangular radiance of a file (`.exr`, `.hdr` and others), and what was left out,
+/// decoded or repaired.
 ///
 /// # Errors
 /// No environment and no file of that name; an image that does not hold finite radiance of 0 or more.
-pub fn load(name: &str) -> Outcome<EnvironmentMap> {
+pub fn load(name: &str) -> Outcome<(EnvironmentMap, Vec<Note>)> {
     match EnvironmentMap::named(name) {
-        Some(map) => Ok(map),
+        Some(map) => Ok((map, Vec::new())),
         None => read(Path::new(name)),
     }
 }
@@ -24,34 +26,31 @@ pub fn is_built_in(name: &str) -> bool {
     EnvironmentMap::NAMES.contains(&name)
 }
 
-fn read(path: &Path) -> Outcome<EnvironmentMap> {
-    let wrong = |what: &dyn std::fmt::Display| {
-        let names = EnvironmentMap::NAMES.map(|n| format!("{n:?}")).join(", ");
-        Failure::input(format!("environment {:?}: {what}", path.display().to_string())).hint(format!(
-            "built in are {names}; anything else is the path of an equirectangular .hdr or .exr image"
-        ))
+fn read(path: &Path) -> Outcome<(EnvironmentMap, Vec<Note>)> {
+    let names = || EnvironmentMap::NAMES.map(|n| format!("{n:?}")).join(", ");
+    let hint = || {
+        format!(
+            "built in are {}; anything else is the path of an equirectangular .exr or .hdr image",
+            names()
+        )
     };
     if !path.is_file() {
-        return Err(wrong(&"no such file, and no built-in environment of that name"));
+        let what = "no such file, and no built-in environment of that name";
+        return Err(
+            Failure::input(format!("environment {:?}: {what}", path.display().to_string())).hint(hint())
+        );
     }
-    let image = load_image(path)?;
-    if image.kind != SampleKind::F32 {
-        return Err(wrong(&"found an image of whole numbers, expected radiance as floats"));
-    }
-    let map = image.require_rgb()?;
-    let texels: Vec<Vec3> = map.values.chunks_exact(3).map(Vec3::from_slice).collect();
-    if let Some(i) = texels.iter().position(|t| !t.is_finite() || t.min_element() < 0.0) {
-        let (x, y) = (i % map.width as usize, i / map.width as usize);
-        return Err(wrong(&format!(
-            "found a radiance of {} at column {x}, row {y}, expected finite ones of 0 or more",
-            texels[i]
-        )));
-    }
-    Ok(EnvironmentMap { width: map.width, height: map.height, texels })
+    let (image, notes) =
+        environment::read(path, &ReadOptions::default()).map_err(|e| Failure::from(e).hint(hint()))?;
+    let about = format!("environment {:?}", path.display().to_string());
+    let notes = notes.into_iter().map(|message| Note::new(about.as_str(), message)).collect();
+    Ok((EnvironmentMap { width: image.width, height: image.height, texels: image.texels }, notes))
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+    use rubor_assets::image_io::SampleKind;
     use rubor_rig::map::Map;
 
     use super::*;
@@ -66,14 +65,16 @@ mod tests {
             save_map(&path, map, kind).unwrap();
             path.to_string_lossy().into_owned()
         };
-        let read = load(&save("a.exr", &map, SampleKind::F32)).unwrap();
+        let (read, notes) = load(&save("a.exr", &map, SampleKind::F32)).unwrap();
+        assert!(notes.is_empty());
         assert_eq!((read.width, read.height, read.texels[5]), (4, 2, Vec3::new(15.0, 16.0, 17.0)));
         let message = |name: &str| load(name).unwrap_err().to_string();
-        assert!(message(&save("a.png", &map, SampleKind::U8)).contains("whole numbers"));
+        let (_, notes) = load(&save("a.png", &map, SampleKind::U8)).unwrap();
+        assert!(notes.iter().any(|n| n.message.contains("low dynamic range")), "{notes:?}");
         map.values[13] = -1.0;
-        assert!(message(&save("b.exr", &map, SampleKind::F32)).contains("column 0, row 1"));
+        assert!(message(&save("b.exr", &map, SampleKind::F32)).contains("row 1"));
         assert!(message("stdio").contains("\"studio\""));
-        assert_eq!(load("sky").unwrap(), EnvironmentMap::sky());
+        assert_eq!(load("sky").unwrap(), (EnvironmentMap::sky(), Vec::new()));
     }
 
     #[test]
@@ -82,7 +83,7 @@ mod tests {
         let path = folder.path().join("a.hdr");
         let picture = image::Rgb32FImage::from_pixel(8, 4, image::Rgb([4.0, 2.0, 0.5]));
         picture.save(&path).unwrap();
-        let read = load(&path.to_string_lossy()).unwrap();
+        let (read, _) = load(&path.to_string_lossy()).unwrap();
         assert!(read.texels.iter().all(|t| *t == Vec3::new(4.0, 2.0, 0.5)));
     }
 }

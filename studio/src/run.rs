@@ -137,7 +137,10 @@ pub fn run(
     })?;
     watch.end();
 
+    let of_surroundings = studio.take_notes();
+    watch.notes(&of_surroundings);
     let mut notes = plan.notes().to_vec();
+    notes.extend(of_surroundings);
     let mut files = vec![PathBuf::from(SHEET_FILE)];
     let small: Vec<RgbImage> = sheet.into_values().collect();
     output::save_picture(&to.folder.join(SHEET_FILE), &contact_sheet::page(&small))?;

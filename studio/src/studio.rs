@@ -9,18 +9,19 @@
 
 use glam::{Mat4, Vec3};
 use image::RgbImage;
-use rubor_renderer::channels::{Channel, ChannelData, Extent};
+use rubor_renderer::channels::ChannelData;
 use rubor_renderer::settings::Settings;
 use rubor_renderer::{
-    AdapterDescription, Camera, ColorTable, Environment, EnvironmentMap, FrameStats, FrameTimes, Gpu,
-    HeadInstance, HeadOnGpu, Image, Light, LightKind, Renderer, Scene, list_adapters,
+    AdapterDescription, Camera, ColorTable, Environment, FrameStats, FrameTimes, Gpu, HeadInstance,
+    HeadOnGpu, Image, Light, LightKind, Renderer, Scene, native,
 };
-use rubor_rig::evaluate::{EnvironmentState, LightState, Shot};
+use rubor_rig::evaluate::{LightState, Shot};
 use rubor_rig::head::Head;
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinLookup, SkinModel};
 
 use crate::environment;
 use crate::error::{Failure, Outcome};
+use crate::notes::Note;
 use crate::report::Adapter;
 
 /// Radiance behind the heads: a grey that a face is neither lost nor dazzled before.
@@ -37,12 +38,12 @@ const DISTANT_LAMP_RADIUS: f32 = 0.05;
 /// # Errors
 /// None is there, none has that name, the driver refuses.
 pub fn open_device(wanted: Option<&str>) -> Outcome<Gpu> {
-    Ok(Gpu::new(wanted)?)
+    Ok(native::open(wanted)?)
 }
 
 /// The adapters of this machine, best first.
 pub fn adapters() -> Vec<AdapterDescription> {
-    list_adapters()
+    native::adapters()
 }
 
 /// A device with the heads and surroundings that shots name.
@@ -51,20 +52,17 @@ pub struct Studio {
     skin: SkinLookup,
     heads: Vec<HeadOnGpu>,
     surroundings: Surroundings,
+    notes: Vec<Note>,
 }
 
-/// The last environment. Filtering is the same for the same map and angle, so a frame does not depend on those before
-/// it, and a light that turns through a sequence does not fill the memory.
-#[derive(Default)]
-struct Surroundings {
-    map: Option<(String, EnvironmentMap)>,
-    /// With its name and the columns that it is turned by.
-    on_device: Option<(String, i64, Environment)>,
-}
+/// The last environment by its name: one that turns is the same map under another angle.
+type Surroundings = Option<(String, Environment)>;
 
 /// A frame that the device works on.
 pub struct Drawn {
-    frame: Frame,
+    frame: rubor_renderer::Drawn,
+    /// Channels that the frame has to have.
+    channels: usize,
 }
 
 /// A finished frame.
@@ -96,7 +94,7 @@ impl Studio {
     pub fn open(adapter: Option<&str>) -> Outcome<Self> {
         let renderer = Renderer::new(open_device(adapter)?)?;
         let skin = SkinModel::new(&ChromophoreModel::default()).bake(COLOR_TABLE_SIDE, COLOR_TABLE_SIDE);
-        Ok(Self { renderer, skin, heads: Vec::new(), surroundings: Surroundings::default() })
+        Ok(Self { renderer, skin, heads: Vec::new(), surroundings: None, notes: Vec::new() })
     }
 
     /// The device.
@@ -127,6 +125,11 @@ impl Studio {
         Ok(())
     }
 
+    /// What loading surroundings left out, decoded or repaired since the last call.
+    pub fn take_notes(&mut self) -> Vec<Note> {
+        std::mem::take(&mut self.notes)
+    }
+
     /// Forgets the frames before: the next frame is number `frame` and antialiasing over time mixes nothing into it.
     pub fn cut(&mut self, frame: u32) {
         self.renderer.cut(u64::from(frame));
@@ -147,20 +150,24 @@ impl Studio {
     /// # Errors
     /// No shot, or another number than there are heads; surroundings that do not load; what the renderer refuses.
     pub fn draw(&mut self, shots: &[Shot], spacing_m: f32, settings: &Settings) -> Outcome<Drawn> {
-        let (image, stats) =
-            self.with_scene(shots, spacing_m, |renderer, scene| Ok(renderer.render(scene, settings)?))?;
-        // Channels are those of the last frame drawn.
-        let channels =
-            settings.output.channels.iter().map(|c| self.read(*c, settings)).collect::<Outcome<_>>()?;
-        Ok(Drawn { frame: Frame { image, stats, channels } })
+        let gpu = self.renderer.gpu().clone();
+        let frame = self.with_scene(shots, spacing_m, |renderer, scene| {
+            Ok(native::wait(&gpu, renderer.draw_any(scene, settings))?)
+        })?;
+        Ok(Drawn { frame, channels: settings.output.channels.len() })
     }
 
     /// Waits for a frame.
     ///
     /// # Errors
-    /// The device failed.
+    /// The device failed; the frame lacks a channel that its settings name.
     pub fn finish(&mut self, drawn: Drawn) -> Outcome<Frame> {
-        Ok(drawn.frame)
+        let (image, stats, channels) = native::wait(self.renderer.gpu(), drawn.frame.finish_with_channels())?;
+        if channels.len() < drawn.channels {
+            return Err(Failure::input("channels: found velocity, which this frame does not have")
+                .hint("velocity needs --antialias smaa-t2x or smaa-4x"));
+        }
+        Ok(Frame { image, stats, channels })
     }
 
     /// Draws a shot of one head again and again, one frame right after the other, and says what each cost; the first
@@ -176,40 +183,10 @@ impl Studio {
         frames: u32,
     ) -> Outcome<Vec<FrameTimes>> {
         let shots = std::slice::from_ref(shot);
-        self.with_scene(shots, 0.0, |renderer, scene| Ok(renderer.measure(scene, settings, warm_up, frames)?))
-    }
-
-    /// A channel of the last frame drawn.
-    fn read(&self, channel: Channel, settings: &Settings) -> Outcome<ChannelData> {
-        let renderer = &self.renderer;
-        let values: Vec<f32> = match channel {
-            Channel::Radiance => renderer.read_hdr()?.concat(),
-            Channel::Diffuse => renderer.read_diffuse()?.concat(),
-            Channel::Albedo => renderer.read_albedo()?.concat(),
-            Channel::Velocity => renderer.read_velocity()?.concat(),
-            Channel::Positions => renderer.read_positions()?.iter().flat_map(|p| p.to_array()).collect(),
-            Channel::Visibility => renderer.read_occlusion()?,
-            Channel::TangentFrames => {
-                let frames = renderer.read_surface_frames()?;
-                frames.iter().flat_map(|(n, t)| [n.x, n.y, n.z, t.x, t.y, t.z, t.w]).collect()
-            }
-            Channel::Irradiance | Channel::Direct | Channel::Depth | Channel::Ids => {
-                let expected = "radiance, diffuse, albedo, velocity, positions, visibility or tangent-frames";
-                let found = channel.name();
-                return Err(Failure::input(format!("channels: found {found}, expected {expected}")));
-            }
-        };
-        let row = channel.row();
-        let size = match row.extent {
-            Extent::Pixels => settings.frame_size(),
-            Extent::Points | Extent::Vertices => [(values.len() / row.components.len()) as u32, 1],
-        };
-        if values.len() != row.components.len() * size[0] as usize * size[1] as usize || values.is_empty() {
-            let found = channel.name();
-            return Err(Failure::input(format!("channels: found {found}, which this frame does not have"))
-                .hint("velocity needs --antialias smaa-t2x or smaa-4x"));
-        }
-        Ok(ChannelData { channel, size, values })
+        let gpu = self.renderer.gpu().clone();
+        self.with_scene(shots, 0.0, |renderer, scene| {
+            Ok(native::wait(&gpu, renderer.measure(scene, settings, warm_up, frames))?)
+        })
     }
 
     fn with_scene<T>(
@@ -227,7 +204,7 @@ impl Studio {
             )));
         }
         if let Some(state) = &first.environment {
-            self.surroundings.load(state, self.renderer.gpu())?;
+            self.load_environment(&state.name)?;
         }
         let middle = (shots.len() as f32 - 1.0) / 2.0;
         let instances: Vec<_> = self
@@ -242,7 +219,6 @@ impl Studio {
             })
             .collect();
         let lights: Vec<_> = first.lights.iter().map(light).collect();
-        let on_device = self.surroundings.on_device.as_ref();
         let scene = Scene {
             heads: &instances,
             camera: Camera {
@@ -252,26 +228,20 @@ impl Studio {
                 fov_degrees: first.camera.fov_y.to_degrees(),
             },
             lights: &lights,
-            environment: first.environment.as_ref().and(on_device.map(|(_, _, environment)| environment)),
+            environment: first.environment.as_ref().and(self.surroundings.as_ref().map(|(_, e)| e)),
+            environment_rotation: first.environment.as_ref().map_or(0.0, |e| e.rotation_y),
             environment_intensity: first.environment.as_ref().map_or(0.0, |e| e.intensity),
             background_linear: BACKDROP_LINEAR,
         };
         draw(&mut self.renderer, &scene)
     }
-}
 
-impl Surroundings {
-    /// Makes the environment of a state the one on the device.
-    fn load(&mut self, state: &EnvironmentState, gpu: &Gpu) -> Outcome {
-        if self.map.as_ref().is_none_or(|(name, _)| *name != state.name) {
-            self.map = Some((state.name.clone(), environment::load(&state.name)?));
-        }
-        let Some((name, map)) = &self.map else { return Ok(()) };
-        let degrees = state.rotation_y.to_degrees();
-        // Maps are turned by whole columns: angles that round to the same one have the same light.
-        let columns = ((degrees / 360.0 * map.width as f32).round() as i64).rem_euclid(i64::from(map.width));
-        if !self.on_device.as_ref().is_some_and(|(of, by, _)| of == name && *by == columns) {
-            self.on_device = Some((name.clone(), columns, map.rotated(degrees).upload(gpu)));
+    /// Makes an environment the one on the device.
+    fn load_environment(&mut self, name: &str) -> Outcome {
+        if self.surroundings.as_ref().is_none_or(|(known, _)| known != name) {
+            let (map, notes) = environment::load(name)?;
+            self.notes.extend(notes);
+            self.surroundings = Some((name.to_owned(), map.upload(self.renderer.gpu())));
         }
         Ok(())
     }

@@ -2,15 +2,13 @@
 
 use glam::{Mat4, Vec3};
 use rubor_assets::{export, import};
-use rubor_renderer::{
-    Camera, ColorTable, Gpu, HeadInstance, HeadOnGpu, RenderError, Renderer, ScatterMethod, Scene, Settings,
-    TransmitMethod, antialias,
-};
+use rubor_renderer::channels::Channel;
+use rubor_renderer::settings::{AntialiasMethod, Output, Quality, ScatterMethod, Settings, TransmitMethod};
+use rubor_renderer::{Camera, ColorTable, HeadInstance, HeadOnGpu, RenderError, Renderer, Scene, native};
 use rubor_rig::deform;
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
-use rubor_rig::skin::profile::Profile;
 use rubor_rig::timeline::Sequence;
 use std::io::Write;
 
@@ -23,7 +21,7 @@ fn default_head() -> Head {
 }
 
 fn renderer() -> Option<Renderer> {
-    match Gpu::new(None).and_then(Renderer::new) {
+    match native::open(None).and_then(Renderer::new) {
         Ok(renderer) => Some(renderer),
         Err(error) => {
             assert!(std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: {error}");
@@ -41,6 +39,7 @@ fn farthest(a: &[Vec3], b: &[Vec3]) -> f32 {
 #[test]
 fn kernel_and_cpu_agree_over_the_demo() -> Result<(), RenderError> {
     let Some(mut renderer) = renderer() else { return Ok(()) };
+    let gpu = renderer.gpu().clone();
     let head = default_head();
     let table = ColorTable { width: 1, height: 1, texels: &[[0.5; 3]] };
     let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &table)?;
@@ -48,15 +47,15 @@ fn kernel_and_cpu_agree_over_the_demo() -> Result<(), RenderError> {
     let rig = Rig::default_rig().expect("the default rig is valid");
     let (evaluator, _) = Evaluator::new(&head, &rig, &sequence).expect("the demo plays on the default head");
     let settings = Settings {
-        size: [16, 16],
-        scatter: ScatterMethod::None,
-        transmit: TransmitMethod::None,
-        appearance: Default::default(),
-        profile: std::sync::Arc::new(Profile::deon_six()),
-        antialias: antialias::Settings::new(antialias::Mode::None, antialias::Preset::High),
-        supersampling: 1,
-        shadow_size: 16,
-        exposure: 1.0,
+        output: Output { size: [16, 16], ..Output::default() },
+        quality: Quality {
+            scatter: ScatterMethod::None,
+            transmit: TransmitMethod::None,
+            antialias: AntialiasMethod::None,
+            shadow_size: 16,
+            ..Quality::default()
+        },
+        ..Settings::default()
     };
     for step in 0..10 {
         let face = evaluator.at(f64::from(step) * 1.2 + 0.1).face;
@@ -66,16 +65,19 @@ fn kernel_and_cpu_agree_over_the_demo() -> Result<(), RenderError> {
             camera: Camera { position: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 30.0 },
             lights: &[],
             environment: None,
+            environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
         };
-        renderer.render(&scene, &settings)?;
+        native::wait(&gpu, renderer.render(&scene, &settings))?;
         let place = Mat4::from_rotation_translation(face.head_rotation, face.head_translation);
         let cpu: Vec<Vec3> = deform::deform_points(&head.mesh, &head.shapes, &face.shapes)
             .into_iter()
             .map(|p| place.transform_point3(p))
             .collect();
-        let distance = farthest(&renderer.read_positions()?, &cpu);
+        let positions = native::wait(&gpu, renderer.read(Channel::Positions))?;
+        let positions: Vec<Vec3> = positions.texels::<3>().map(Vec3::from_array).collect();
+        let distance = farthest(&positions, &cpu);
         assert!(distance < TOLERANCE * head.height(), "step {step}: {distance} m");
     }
     Ok(())

@@ -7,12 +7,12 @@ use clap::ValueEnum;
 use exr::prelude::{FlatImage, FlatSamples, WritableImage, f16, read_all_flat_layers_from_file};
 use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
 use rubor::studio::open_device;
-use rubor_renderer::Gpu;
 use rubor_renderer::antialias::reference::Picture;
 use rubor_renderer::antialias::{
     Alpha, AntialiasError, EdgeSource, Encoding, Filter, Mode, Preset, Settings,
 };
 use rubor_renderer::settings::AntialiasMethod;
+use rubor_renderer::{Gpu, native};
 
 use super::console::Progress;
 use rubor::output;
@@ -234,6 +234,7 @@ fn named_like(input: &Path, folder: &Path, as_picture: bool) -> PathBuf {
 
 /// Filters for stored values (PNG and the like) and for light (EXR).
 struct Filters<'a> {
+    gpu: &'a Gpu,
     stored: Filter<'a>,
     light: Filter<'a>,
     stage: Stage,
@@ -263,6 +264,7 @@ impl<'a> Filters<'a> {
         };
         let light = Settings { encoding: Encoding::Linear, alpha: Alpha::Associated, ..settings };
         Ok(Self {
+            gpu,
             stored: Filter::new(gpu, settings).map_err(Failure::input)?,
             light: Filter::new(gpu, light).map_err(Failure::input)?,
             stage: arguments.stage,
@@ -287,16 +289,18 @@ impl<'a> Filters<'a> {
             Picture { width, height, pixels: pixels.pixels().map(|pixel| pixel.0).collect() }
         };
         if self.stage != Stage::Result {
-            return save_stage(&mut self.stored, self.stage, &picture(), input, target);
+            return save_stage(self.gpu, &mut self.stored, self.stage, &picture(), input, target);
         }
         let color = image.color();
         let failed = |error: AntialiasError| device_failure(input, error);
         let filtered = if color.bytes_per_pixel() == color.channel_count() {
             let rgba = image.to_rgba8();
-            let bytes = self.stored.bytes(image.width(), image.height(), rgba.as_raw()).map_err(failed)?;
+            let bytes =
+                native::wait(self.gpu, self.stored.bytes(image.width(), image.height(), rgba.as_raw()))
+                    .map_err(failed)?;
             image::RgbaImage::from_raw(image.width(), image.height(), bytes).map(DynamicImage::from)
         } else {
-            let result = self.stored.picture(&picture()).map_err(failed)?;
+            let result = native::wait(self.gpu, self.stored.picture(&picture())).map_err(failed)?;
             let whole = |v: &f32| (v.clamp(0.0, 1.0) * 65535.0).round() as u16;
             let values = result.pixels.iter().flatten().map(whole).collect();
             image::ImageBuffer::from_raw(image.width(), image.height(), values).map(DynamicImage::ImageRgba16)
@@ -371,9 +375,10 @@ impl<'a> Filters<'a> {
             (report.width, report.height) = (width, height);
             found = true;
             if self.stage != Stage::Result {
-                return save_stage(&mut self.light, self.stage, &picture, input, target);
+                return save_stage(self.gpu, &mut self.light, self.stage, &picture, input, target);
             }
-            let result = self.light.picture(&picture).map_err(|error| device_failure(input, error))?;
+            let result = native::wait(self.gpu, self.light.picture(&picture))
+                .map_err(|error| device_failure(input, error))?;
             let changed: Vec<usize> =
                 (0..r.len()).filter(|&i| result.pixels[i] != picture.pixels[i]).collect();
             report.changed_pixels += changed.len();
@@ -481,6 +486,7 @@ fn save_png(image: &DynamicImage, target: &Path) -> Outcome {
 
 /// Edges as in figure 9.1 (red left, green top), or the four weights of a pixel's edges.
 fn save_stage(
+    gpu: &Gpu,
     filter: &mut Filter,
     stage: Stage,
     picture: &Picture,
@@ -490,14 +496,14 @@ fn save_stage(
     let (width, height) = (picture.width, picture.height);
     let failed = |error: AntialiasError| device_failure(input, error);
     let (image, changed_pixels) = if stage == Stage::Edges {
-        let edges = filter.edges(picture).map_err(failed)?;
+        let edges = native::wait(gpu, filter.edges(picture)).map_err(failed)?;
         let values =
             edges.left.iter().zip(&edges.top).flat_map(|(l, t)| [u8::from(*l) * 255, u8::from(*t) * 255, 0]);
         let count = edges.left.iter().zip(&edges.top).filter(|(l, t)| **l || **t).count();
         let image = image::RgbImage::from_raw(width as u32, height as u32, values.collect());
         (image.map(DynamicImage::from), count)
     } else {
-        let weights = filter.weights(picture).map_err(failed)?;
+        let weights = native::wait(gpu, filter.weights(picture)).map_err(failed)?;
         let count = weights.iter().filter(|weights| **weights != [0; 4]).count();
         let image = image::RgbaImage::from_raw(width as u32, height as u32, weights.concat());
         (image.map(DynamicImage::from), count)
