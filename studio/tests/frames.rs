@@ -1,5 +1,7 @@
 //! Frames do not depend on which others are drawn, in which order, and by how many processes.
 
+use std::io::Write;
+
 use rubor::inputs::{self, LoadedHead};
 use rubor::job::FrameList;
 use rubor::studio::adapters;
@@ -21,7 +23,7 @@ fn can_draw() -> bool {
     let found = !adapters().is_empty();
     assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
     if !found {
-        eprintln!("SKIPPED: no graphics adapter");
+        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
     }
     found
 }
