@@ -2,6 +2,9 @@
 //!
 //! One rule decides the exit code of the command: 0 done, 1 the job failed (a file that cannot be written, a lost
 //! device, a result that is not good enough), 2 the input or the arguments are wrong.
+//!
+//! The command prints the message and the hint as they are. `miette` would break long paths over lines, which then cannot
+//! be searched for, and has nothing to add: messages already name file, line, column, what was found and what was expected.
 
 use std::fmt::Display;
 use std::path::Path;

@@ -196,8 +196,9 @@ impl Job {
             *path = inputs::absolute(&folder.join(&*path))?;
             Ok(())
         };
-        let files = job.heads.iter_mut().chain(&mut job.environment).filter_map(|input| input.file.as_mut());
-        files.map(from_file).collect::<Outcome<()>>()?;
+        let mut files =
+            job.heads.iter_mut().chain(&mut job.environment).filter_map(|input| input.file.as_mut());
+        files.try_for_each(from_file)?;
         let of_lights = job.lights.as_mut().and_then(|l| l.environment.as_mut());
         for environment in job.sequence.environment.iter_mut().chain(of_lights) {
             if !environment::is_built_in(&environment.name) {

@@ -1,5 +1,6 @@
 //! The command as a person uses it: what it makes, and what it says to wrong input.
 
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -45,7 +46,7 @@ fn can_draw() -> bool {
     let found = rubor(&["adapters"]).status.success();
     assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
     if !found {
-        eprintln!("SKIPPED: no graphics adapter");
+        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
     }
     found
 }

@@ -1,5 +1,6 @@
 //! `profile`, `kernel`, `compare` and `chart` as a person uses them.
 
+use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -97,7 +98,8 @@ fn walks_are_kept_between_runs() {
         assert!(first != folder.json(&profile), "what was kept is not read");
     } else {
         assert!(kept.is_empty(), "{kept:?}");
-        eprintln!("SKIPPED: the walk took less than a second, so there is none to read");
+        writeln!(std::io::stderr(), "SKIPPED: the walk took less than a second, so there is none to read")
+            .expect("stderr is open");
     }
 }
 
@@ -200,7 +202,7 @@ fn a_chart_has_a_row_a_method_and_its_pictures() {
     folder.refused(&["chart", "--size", "0x8"], &["0x8"]);
     if !folder.run(&["adapters"]).status.success() {
         assert!(std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
-        eprintln!("SKIPPED: no graphics adapter");
+        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
         return;
     }
     let out = folder.path("out");

@@ -1,3 +1,5 @@
+use std::io::Write;
+
 use super::*;
 use image::{GrayAlphaImage, GrayImage, Rgb, RgbImage, RgbaImage};
 
@@ -18,7 +20,7 @@ fn has_gpu() -> bool {
     let found = !rubor::studio::adapters().is_empty();
     assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
     if !found {
-        eprintln!("SKIPPED: no graphics adapter");
+        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
     }
     found
 }
