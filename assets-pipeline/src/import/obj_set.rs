@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Faces of a shape are compared with the neutral's: points in another order are matched by faces that correspond in
-//! order; a shape of another mesh is refused.
+//! order or by texture coordinates; a shape of another mesh is refused.
 //!
 //! The names of the files are the names of the shapes. ICT-FaceKit is the set that this was made for; its materials and
 //! its `vertex_indices.json` (68 landmarks of the iBUG scheme) are known by name.
@@ -164,7 +164,9 @@ pub fn read(options: &Options) -> Result<ImportedSet, ImportError> {
         }
         let found = compare(&mesh, &shape);
         let place = |p: usize| match &found {
-            Match::ByFaces(shape_of) => shape_of[p].map(|p| shape.points[p as usize]),
+            Match::ByFaces(shape_of) | Match::ByUvs(shape_of) => {
+                shape_of[p].map(|p| shape.points[p as usize])
+            }
             _ => Some(shape.points[p]),
         };
         let offset = |(p, rest): (usize, &Vec3)| place(p).map_or(Vec3::ZERO, |place| place * scale - *rest);
@@ -183,6 +185,14 @@ pub fn read(options: &Options) -> Result<ImportedSet, ImportError> {
         match matched {
             Match::ByFaces(_) => {
                 notes.add("points in another order than the neutral's are matched by faces", file_name(path));
+            }
+            Match::ByUvs(_) => {
+                let message = "points in another order than the neutral's are matched by texture coordinates";
+                notes.add(message, file_name(path));
+            }
+            Match::OrderWithOtherUvs => {
+                let message = "shapes with other texture coordinates are matched by the order of points and their faces";
+                notes.add(message, file_name(path));
             }
             Match::NoFaces => {
                 notes.add("shapes without faces are matched by the order of points alone", file_name(path));
