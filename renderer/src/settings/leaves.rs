@@ -89,7 +89,7 @@ fn parse_size(text: &str) -> Result<Value, String> {
     Ok(serde_json::json!([side(width)?, side(height)?]))
 }
 
-/// Every setting, in the order of [`Settings`].
+/// Every setting, by the name of its group and its own.
 pub fn leaves() -> &'static [Leaf] {
     static LEAVES: LazyLock<Vec<Leaf>> = LazyLock::new(read_schema);
     &LEAVES

@@ -14,9 +14,11 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiffusionProfile(Arc<Profile>);
 
+/// A profile by its name.
+type Published = (&'static str, fn() -> Profile);
+
 /// The published profiles.
-const PUBLISHED: [(&str, fn() -> Profile); 2] =
-    [("deon-six", Profile::deon_six), ("jimenez-four", Profile::jimenez_four)];
+const PUBLISHED: [Published; 2] = [("deon-six", Profile::deon_six), ("jimenez-four", Profile::jimenez_four)];
 
 impl DiffusionProfile {
     /// The value, shared.

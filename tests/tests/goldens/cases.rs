@@ -22,6 +22,10 @@ pub(crate) enum Channel {
     Albedo,
     /// Diffuse light before albedo, scattered where the method scatters.
     Diffuse,
+    /// Reversed depth.
+    Depth,
+    /// Which triangle of which head is seen.
+    Ids,
     /// Motion since the previous frame, pixels.
     Velocity,
     /// Deformed points, metres.
@@ -43,6 +47,7 @@ pub(crate) struct Methods {
     pub(crate) wrinkles: &'static str,
     pub(crate) specular: &'static str,
     pub(crate) antialias: &'static str,
+    pub(crate) tone_map: &'static str,
     pub(crate) exposure: f32,
 }
 
@@ -71,6 +76,7 @@ const USUAL: Methods = Methods {
     wrinkles: "partial-derivative",
     specular: "one-lobe",
     antialias: "none",
+    tone_map: "filmic",
     exposure: 1.0,
 };
 
@@ -83,6 +89,22 @@ fn case(name: &str, scene: &'static str, methods: Methods) -> Case {
         frames: 1,
         methods,
         channel: Channel::Image,
+    }
+}
+
+impl Methods {
+    /// The method of a group of the renderer's table; nothing for a group that no picture varies.
+    pub(crate) fn of_group(&self, group: &str) -> Option<&'static str> {
+        Some(match group {
+            "scatter" => self.scatter,
+            "transmit" => self.transmit,
+            "color" => self.color,
+            "wrinkles" => self.wrinkles,
+            "specular" => self.specular,
+            "antialias" => self.antialias,
+            "tone-map" => self.tone_map,
+            _ => return None,
+        })
     }
 }
 
@@ -189,13 +211,16 @@ fn passes() -> Vec<Case> {
     vec![
         read("pass-morph", "surprise", Channel::Positions),
         read("pass-morph-occlusion", "mouth", Channel::Occlusion),
-        read("pass-surface-frames-normals", "surprise", Channel::Normals),
-        read("pass-surface-frames-tangents", "surprise", Channel::Tangents),
+        read("pass-tangent-frames-normals", "surprise", Channel::Normals),
+        read("pass-tangent-frames-tangents", "surprise", Channel::Tangents),
         read("pass-shade-albedo", "blush", Channel::Albedo),
         light("pass-shade-irradiance", "none"),
         light("pass-scatter-diffuse", "separable:17"),
+        read("pass-visibility-depth", "portrait", Channel::Depth),
+        read("pass-visibility-ids", "crowd", Channel::Ids),
         read("pass-compose-hdr", "portrait", Channel::Hdr),
         moving("pass-velocity", "smaa-t2x"),
+        case("pass-display-linear", "portrait", Methods { tone_map: "linear", ..USUAL }),
         case("pass-display-dark", "portrait", Methods { exposure: 0.25, ..USUAL }),
         case("pass-display-bright", "portrait", Methods { exposure: 4.0, ..USUAL }),
     ]

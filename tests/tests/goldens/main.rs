@@ -19,6 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use rubor_renderer::settings::GROUPS;
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
@@ -138,6 +139,17 @@ fn faults_of_the_set(cases: &[Case], hashes: &Hashes, tolerances: &Tolerances) -
     let unknown_pictures = tolerances.pictures.keys().filter(|name| !names.contains(name.as_str()));
     for name in unknown_groups.chain(unknown_pictures) {
         faults.push(format!("{name}: tolerances.json lists it and no case has that name"));
+    }
+    for group in GROUPS {
+        for method in group.methods {
+            let shows = |case: &Case| {
+                let name = case.methods.of_group(group.name).unwrap_or_default();
+                name.split(':').next() == Some(method.name)
+            };
+            if !cases.iter().any(shows) {
+                faults.push(format!("{} {}: no picture shows it", group.name, method.name));
+            }
+        }
     }
     if bytes > LARGEST_SET {
         faults.push(format!("tests/goldens holds {bytes} bytes, expected at most {LARGEST_SET}"));

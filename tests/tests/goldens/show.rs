@@ -37,6 +37,12 @@ fn color([x, y, z, w]: [f32; 4], channel: Channel) -> [u8; 3] {
     let signed = |v: f32| byte(0.5 + 0.5 * v);
     match channel {
         Channel::Image | Channel::Hdr | Channel::Diffuse => [x, y, z].map(light),
+        Channel::Depth => [byte(x.max(0.0).sqrt()); 3],
+        // Neighbouring numbers in different colours.
+        Channel::Ids => {
+            let mixed = x.to_bits().wrapping_mul(0x9e37_79b9).rotate_left(13).wrapping_mul(0x85eb_ca6b);
+            if x.to_bits() == 0 { [0; 3] } else { [mixed >> 24, mixed >> 16, mixed >> 8].map(|b| b as u8) }
+        }
         Channel::Albedo => [x, y, z].map(|v| byte(v.max(0.0).powf(1.0 / 2.2))),
         Channel::Velocity => [signed(x / MOTION_PX), signed(y / MOTION_PX), 128],
         Channel::Positions => [x / 0.13, y / 0.13, z / 0.13].map(signed),

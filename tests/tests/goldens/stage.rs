@@ -119,7 +119,7 @@ impl Stage {
                 shadow_size: SHADOW_SIZE,
                 ..Quality::default()
             },
-            look: Look { exposure: methods.exposure, ..Look::default() },
+            look: Look { exposure: methods.exposure, tone_map: methods.tone_map.parse()? },
         };
         let mut image = Vec::new();
         self.renderer.cut(0);
@@ -171,6 +171,11 @@ impl Stage {
                 let strength = values(channels::Channel::Albedo)?;
                 let pixel = |([r, g, b, _], [.., a]): ([f32; 4], [f32; 4])| [r, g, b, a];
                 Drawn::Values(light.into_iter().zip(strength).map(pixel).collect())
+            }
+            Channel::Depth | Channel::Ids => {
+                let channel =
+                    if channel == Channel::Depth { channels::Channel::Depth } else { channels::Channel::Ids };
+                Drawn::Values(read(channel)?.values.into_iter().map(|v| [v, 0.0, 0.0, 0.0]).collect())
             }
             Channel::Velocity => {
                 let velocity = read(channels::Channel::Velocity)?;

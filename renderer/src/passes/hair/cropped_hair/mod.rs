@@ -16,9 +16,9 @@
 mod tests;
 
 use crate::device::wgsl::{Module, Program, module};
-use crate::device::{Bind, Draw, Gpu, Image, Raster, RasterKernel, Recorder};
+use crate::device::{Bind, Draw, Gpu, Image, Recorder};
 use crate::passes::hair::fibre::{self, Fibre};
-use crate::passes::hair::{blended, drawn_over};
+use crate::passes::hair::{Blended, drawn_over};
 use crate::scene::PosedHead;
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
@@ -39,28 +39,13 @@ pub(crate) struct Params {
 
 /// The pipelines of the pass.
 pub(crate) struct CroppedHair {
-    /// Colour only, and colour with motion.
-    kernels: [RasterKernel; 2],
+    kernels: Blended,
 }
 
 impl CroppedHair {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let targets = [Some(blended()), Some(blended())];
-        let kernel = |targets: &[Option<wgpu::ColorTargetState>]| {
-            RasterKernel::new(
-                gpu,
-                &Raster {
-                    label: "cropped hair",
-                    program: program(),
-                    vertex: "cropped_hair_vertex",
-                    fragment: Some("cropped_hair_fragment"),
-                    targets,
-                    nearer: wgpu::CompareFunction::Greater,
-                    writes_depth: false,
-                },
-            )
-        };
-        Self { kernels: [kernel(&targets[..1]), kernel(&targets)] }
+        let entries = ["cropped_hair_vertex", "cropped_hair_fragment"];
+        Self { kernels: Blended::new(gpu, "cropped hair", &program(), entries) }
     }
 
     /// Draws the hairs of heads over a picture and, where there is one, over its motion.
@@ -98,7 +83,6 @@ impl CroppedHair {
             resources.extend(fibre.resources(&hair_light, light));
             (resources, Draw::Corners(h.head.hair_root_count * 3))
         });
-        let kernel = &self.kernels[usize::from(velocity.is_some())];
-        r.draw_each(kernel, drawn_over(hdr, velocity, &seen.depth), each);
+        r.draw_each(self.kernels.kernel(velocity), drawn_over(hdr, velocity, &seen.depth), each);
     }
 }

@@ -16,9 +16,9 @@ use glam::Vec3;
 use rubor_rig::head::Material;
 
 use crate::device::wgsl::{Module, Program, module};
-use crate::device::{Bind, Draw, Gpu, Image, Raster, RasterKernel, Recorder};
+use crate::device::{Bind, Draw, Gpu, Image, Recorder};
 use crate::passes::hair::fibre::{self, Fibre};
-use crate::passes::hair::{blended, drawn_over};
+use crate::passes::hair::{Blended, drawn_over};
 use crate::scene::PosedHead;
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
@@ -44,28 +44,13 @@ pub(crate) struct Params {
 
 /// The pipelines of the pass.
 pub(crate) struct Overlay {
-    /// Colour only, and colour with motion.
-    kernels: [RasterKernel; 2],
+    kernels: Blended,
 }
 
 impl Overlay {
     pub(crate) fn new(gpu: &Gpu) -> Self {
-        let targets = [Some(blended()), Some(blended())];
-        let kernel = |targets: &[Option<wgpu::ColorTargetState>]| {
-            RasterKernel::new(
-                gpu,
-                &Raster {
-                    label: "overlay",
-                    program: program(),
-                    vertex: "overlay_vertex",
-                    fragment: Some("overlay_fragment"),
-                    targets,
-                    nearer: wgpu::CompareFunction::Greater,
-                    writes_depth: false,
-                },
-            )
-        };
-        Self { kernels: [kernel(&targets[..1]), kernel(&targets)] }
+        let entries = ["overlay_vertex", "overlay_fragment"];
+        Self { kernels: Blended::new(gpu, "overlay", &program(), entries) }
     }
 
     /// Draws the blended triangles of heads over a picture and, where there is one, over its motion. `ambient` is the
@@ -109,7 +94,6 @@ impl Overlay {
             resources.extend(fibre.resources(&hair_light, light));
             (resources, Draw::Corners(h.head.overlay_triangles * 3))
         });
-        let kernel = &self.kernels[usize::from(velocity.is_some())];
-        r.draw_each(kernel, drawn_over(hdr, velocity, &seen.depth), each);
+        r.draw_each(self.kernels.kernel(velocity), drawn_over(hdr, velocity, &seen.depth), each);
     }
 }
