@@ -561,6 +561,17 @@ fn names_and_notes() -> Vec<Case> {
             |i| near(i.head.mesh.points[0].x, 0.01),
         ),
         read(
+            "meshes that a display layer, an override or a level of detail hides",
+            "left out, as hidden ones are",
+            plain()
+                .more(&second_plate(""))
+                .more("createNode displayLayer -n \"layer\";\n\tsetAttr \".v\" no;\nconnectAttr \"layer.di\" \"brow.do\";\n")
+                .more("createNode transform -n \"a\";\n\tsetAttr \".ove\" yes;\n\tsetAttr \".ovv\" no;\nparent -add \"browShape\" \"a\";\n")
+                .more("createNode transform -n \"b\";\n\tsetAttr \".lodv\" no;\nparent -add \"browShape\" \"b\";\n"),
+            &[],
+            |i| assert_eq!(i.head.mesh.points.len(), 9),
+        ),
+        read(
             "keyed visibility",
             "the stored one",
             plain().more(RISE).more("connectAttr \"rise.o\" \"face.v\";\n"),
