@@ -1,7 +1,58 @@
-//! Files that appear under their name only when they are complete.
+//! Names and files: names that a file gives, as names of files; files that appear only when they are complete.
 
+use std::collections::HashSet;
 use std::io::Write;
 use std::path::Path;
+
+/// Longest plain name, bytes: a suffix such as `_scale.exr` fits into the 255 that file systems allow.
+const LONGEST_NAME: usize = 200;
+
+/// Tells whether a name that comes from a file is a plain file name on every system, so that a path made with it stays
+/// in its folder: no separator, drive or stream of any system, no control character, at most 200 bytes.
+pub fn is_plain_name(name: &str) -> bool {
+    !matches!(name, "" | "." | "..") && name.len() <= LONGEST_NAME && !name.contains(is_foreign)
+}
+
+/// Plain file names for names that come from a file (see [`is_plain_name`]), in their order.
+///
+/// Plain names stay. In others `_` stands for each character that no file name may have, and long ones are cut. Names
+/// that become equal, also but for the case of letters, get a number: no file replaces another.
+///
+/// ```
+/// use rubor_assets::files::plain_names;
+/// assert_eq!(plain_names(["joy", "../evil", "..\\evil", ".."]), ["joy", ".._evil", ".._evil_1", "_"]);
+/// ```
+pub fn plain_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<String> {
+    let mut taken = HashSet::new();
+    let mut number = 0u64;
+    let plain = |name: &str| {
+        let mut plain: String = name.chars().map(|c| if is_foreign(c) { '_' } else { c }).collect();
+        // Room for a number behind it.
+        plain.truncate(plain.floor_char_boundary(LONGEST_NAME - 20));
+        if is_plain_name(&plain) { plain } else { "_".into() }
+    };
+    let unique = |name: &'a str| {
+        let first = if is_plain_name(name) { name.to_owned() } else { plain(name) };
+        if taken.insert(first.to_lowercase()) {
+            return first;
+        }
+        let base = plain(name);
+        loop {
+            // One count for all names, so that many equal ones take no time that grows with their square.
+            number += 1;
+            let next = format!("{base}_{number}");
+            if taken.insert(next.to_lowercase()) {
+                return next;
+            }
+        }
+    };
+    names.into_iter().map(unique).collect()
+}
+
+/// Separators of any system, the colon of drives and streams, control characters.
+fn is_foreign(c: char) -> bool {
+    matches!(c, '/' | '\\' | ':') || c.is_control()
+}
 
 /// Writes a file beside its place under a name that nobody can guess, then renames it; a failure leaves nothing behind
 /// and an older file as it was.
@@ -22,6 +73,42 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_name_of_a_file_leaves_its_folder_or_replaces_another() {
+        let hostile = [
+            "../victim/evil",
+            "/etc/evil",
+            "C:\\evil",
+            "C:evil",
+            "a:stream",
+            "..",
+            ".",
+            "",
+            "a\0b",
+            "a\nb",
+            "sub/evil",
+        ];
+        for name in hostile {
+            assert!(!is_plain_name(name), "{name:?}");
+        }
+        for name in ["joy", "Zähne", "a.b", "...", ".hidden", "with space", "-o"] {
+            assert!(is_plain_name(name), "{name:?}");
+            assert_eq!(plain_names([name]), [name]);
+        }
+        let long = "ä".repeat(500);
+        let again = [hostile.as_slice(), &hostile, &["joy", "Joy", "joy_1", long.as_str(), long.as_str()]].concat();
+        let plain = plain_names(again.iter().copied());
+        let different: HashSet<String> = plain.iter().map(|n| n.to_lowercase()).collect();
+        assert_eq!(different.len(), again.len(), "{plain:?}");
+        for name in &plain {
+            assert!(is_plain_name(name), "{name:?}");
+            let mut parts = Path::new(name).components();
+            assert!(matches!(parts.next(), Some(std::path::Component::Normal(_))) && parts.next().is_none());
+        }
+        // A hundred thousand equal names take no time that grows with its square.
+        assert_eq!(plain_names(std::iter::repeat_n("joy", 100_000)).len(), 100_000);
+    }
 
     #[test]
     fn a_file_is_replaced_whole_and_a_failure_leaves_nothing() {

@@ -32,7 +32,7 @@ pub mod environment;
 pub mod error;
 pub mod export;
 pub mod facial_appearance;
-mod files;
+pub mod files;
 pub mod image_io;
 pub mod import;
 pub mod notes;

@@ -578,6 +578,22 @@ fn a_hundred_thousand_columns_or_names_cost_no_square() {
     assert!(started.elapsed().as_secs_f64() < 20.0, "{:?}", started.elapsed());
 }
 
+/// Takes out the line at a place, or doubles it.
+fn lines(bytes: &mut Vec<u8>, at: usize, out: bool) {
+    let start = bytes[..at].iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
+    let end = bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |i| at + i + 1);
+    let line = bytes[start..end].to_vec();
+    let replaced = if out { start..end } else { start..start };
+    bytes.splice(replaced, if out { Vec::new() } else { line }).for_each(drop);
+}
+
+/// Puts another digit in the place of the next one.
+fn digit(bytes: &mut [u8], at: usize, digit: u8) {
+    if let Some(found) = bytes[at..].iter_mut().find(|b| b.is_ascii_digit()) {
+        *found = b'0' + digit;
+    }
+}
+
 /// `RUBOR_MUTATIONS` sets the number of files.
 #[test]
 fn mutated_recordings_end_in_a_take_or_an_error_in_bounded_time() {
@@ -598,7 +614,7 @@ fn mutated_recordings_end_in_a_take_or_an_error_in_bounded_time() {
             let end = if noise.below(2) == 0 { bytes.len() } else { bytes.len().min(1500) };
             let at = noise.below(end);
             let to = (at + noise.below(300)).min(bytes.len());
-            match noise.below(5) {
+            match noise.below(12) {
                 0 => bytes[at] = noise.next() as u8,
                 1 => bytes.truncate(at.max(1)),
                 2 => {
@@ -606,10 +622,13 @@ fn mutated_recordings_end_in_a_take_or_an_error_in_bounded_time() {
                     bytes.splice(at..(at + noise.below(9)).min(bytes.len()), token).for_each(drop);
                 }
                 3 => bytes.drain(at..to).for_each(drop),
-                _ => {
+                4 => {
                     let copy = bytes[at..to].to_vec();
                     bytes.splice(at..at, copy).for_each(drop);
                 }
+                // What keeps the form: another digit, a line less, a line twice.
+                5 | 6 => lines(&mut bytes, at, noise.below(2) == 0),
+                _ => digit(&mut bytes, at, noise.below(10) as u8),
             }
             if bytes.is_empty() {
                 bytes.push(b' ');

@@ -561,6 +561,17 @@ fn names_and_notes() -> Vec<Case> {
             |i| near(i.head.mesh.points[0].x, 0.01),
         ),
         read(
+            "meshes that a display layer, an override or a level of detail hides",
+            "left out, as hidden ones are",
+            plain()
+                .more(&second_plate(""))
+                .more("createNode displayLayer -n \"layer\";\n\tsetAttr \".v\" no;\nconnectAttr \"layer.di\" \"brow.do\";\n")
+                .more("createNode transform -n \"a\";\n\tsetAttr \".ove\" yes;\n\tsetAttr \".ovv\" no;\nparent -add \"browShape\" \"a\";\n")
+                .more("createNode transform -n \"b\";\n\tsetAttr \".lodv\" no;\nparent -add \"browShape\" \"b\";\n"),
+            &[],
+            |i| assert_eq!(i.head.mesh.points.len(), 9),
+        ),
+        read(
             "keyed visibility",
             "the stored one",
             plain().more(RISE).more("connectAttr \"rise.o\" \"face.v\";\n"),
@@ -659,6 +670,22 @@ fn many_of_one_kind_cost_no_square() {
     assert!(started.elapsed().as_secs_f64() < 20.0, "{:?}", started.elapsed());
 }
 
+/// Takes out the line at a place, or doubles it.
+fn lines(bytes: &mut Vec<u8>, at: usize, out: bool) {
+    let start = bytes[..at].iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
+    let end = bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |i| at + i + 1);
+    let line = bytes[start..end].to_vec();
+    let replaced = if out { start..end } else { start..start };
+    bytes.splice(replaced, if out { Vec::new() } else { line }).for_each(drop);
+}
+
+/// Puts another digit in the place of the next one.
+fn digit(bytes: &mut [u8], at: usize, digit: u8) {
+    if let Some(found) = bytes[at..].iter_mut().find(|b| b.is_ascii_digit()) {
+        *found = b'0' + digit;
+    }
+}
+
 /// `RUBOR_MUTATIONS` sets the number of files.
 #[test]
 fn mutated_scenes_end_in_a_head_or_an_error_in_bounded_time() {
@@ -694,7 +721,7 @@ fn mutated_scenes_end_in_a_head_or_an_error_in_bounded_time() {
         for _ in 0..1 + next(3) {
             let at = next(bytes.len());
             let to = (at + next(200)).min(bytes.len());
-            match next(6) {
+            match next(12) {
                 0 => bytes[at] = next(256) as u8,
                 1 => bytes.truncate(at.max(1)),
                 2 | 3 => {
@@ -702,10 +729,13 @@ fn mutated_scenes_end_in_a_head_or_an_error_in_bounded_time() {
                     bytes.splice(at..(at + next(9)).min(bytes.len()), token).for_each(drop);
                 }
                 4 => bytes.drain(at..to).for_each(drop),
-                _ => {
+                5 => {
                     let copy = bytes[at..to].to_vec();
                     bytes.splice(at..at, copy).for_each(drop);
                 }
+                // What keeps the form: another digit, a line less, a line twice.
+                6 | 7 => lines(&mut bytes, at, next(2) == 0),
+                _ => digit(&mut bytes, at, next(10) as u8),
             }
             if bytes.is_empty() {
                 bytes.push(b' ');

@@ -3,7 +3,8 @@
 use super::code_page;
 use super::lexer::{Lexer, Token};
 use super::scene::{
-    BlendShapeData, CurveData, Data, MeshData, Node, NodeId, Plug, PolyCube, Scene, Transform, TweakData,
+    BlendShapeData, CurveData, Data, Drawing, MeshData, Node, NodeId, Plug, PolyCube, Scene, Transform,
+    TweakData,
 };
 use super::words::{fps, metres, number, short};
 use crate::error::Fault;
@@ -243,6 +244,7 @@ impl<'a> Parser<'a> {
             line,
             state: 0,
             envelope: 1.0,
+            drawing: Drawing::default(),
             data,
         };
         self.current = Some(self.scene.add(node));
@@ -444,6 +446,22 @@ impl<'a> Parser<'a> {
         match path {
             "nds" | "nodeState" if self.has_value()? => {
                 self.scene.nodes[id].state = self.count("node state")?;
+                return self.lexer.skip_statement();
+            }
+            "lodv" | "lodVisibility" if self.has_value()? => {
+                self.scene.nodes[id].drawing.level_of_detail = self.visibility()?;
+                return self.lexer.skip_statement();
+            }
+            "ove" | "overrideEnabled" if self.has_value()? => {
+                self.scene.nodes[id].drawing.overridden = self.flag_on()?;
+                return self.lexer.skip_statement();
+            }
+            "ovv" | "overrideVisibility" if self.has_value()? => {
+                self.scene.nodes[id].drawing.override_visible = self.visibility()?;
+                return self.lexer.skip_statement();
+            }
+            "v" | "visibility" if matches!(self.scene.nodes[id].data, Data::Other) && self.has_value()? => {
+                self.scene.nodes[id].drawing.layer_visible = self.visibility()?;
                 return self.lexer.skip_statement();
             }
             "en" | "envelope" if self.has_value()? => {
@@ -826,9 +844,8 @@ impl<'a> Parser<'a> {
                 painted.blocks.push((attribute.index(2), values));
             }
             "it.itg.pdm" => {
-                if self.count("mode")? > 0 {
-                    shape.post_deformed.push(attribute.index(1));
-                }
+                let follows = self.count("mode")? > 0;
+                shape.post_deformed.extend(follows.then(|| attribute.index(1)));
             }
             "tgvs" => self.flags(&mut shape.visible, attribute.index(0))?,
             "tpvs" => self.flags(&mut shape.parent_visible, attribute.index(0))?,

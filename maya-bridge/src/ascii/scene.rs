@@ -23,7 +23,24 @@ pub(crate) struct Node {
     pub(crate) state: u32,
     /// How much of its effect a deformer has.
     pub(crate) envelope: f64,
+    pub(crate) drawing: Drawing,
     pub(crate) data: Data,
+}
+
+/// What hides a node beside its own visibility.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Drawing {
+    pub(crate) level_of_detail: bool,
+    pub(crate) overridden: bool,
+    pub(crate) override_visible: bool,
+    /// Visibility of a display layer.
+    pub(crate) layer_visible: bool,
+}
+
+impl Default for Drawing {
+    fn default() -> Self {
+        Self { level_of_detail: true, overridden: false, override_visible: true, layer_visible: true }
+    }
 }
 
 impl Node {
@@ -340,6 +357,15 @@ impl Scene {
     pub(crate) fn source(&self, node: NodeId, attribute: &str) -> Option<&Plug> {
         let index = *self.by_destination.get(&(node, attribute.to_owned()))?;
         Some(&self.connections[index].0)
+    }
+
+    /// False where a node, or a display layer that it is in, is not drawn; its own `visibility` apart.
+    pub(crate) fn is_drawn(&self, node: NodeId) -> bool {
+        let drawing = &self.nodes[node].drawing;
+        let layer = self.source(node, "do").map(|plug| &self.nodes[plug.node]);
+        drawing.level_of_detail
+            && (!drawing.overridden || drawing.override_visible)
+            && layer.is_none_or(|l| l.kind != "displayLayer" || l.drawing.layer_visible)
     }
 
     /// What a node is connected to.

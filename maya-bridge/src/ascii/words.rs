@@ -60,6 +60,8 @@ pub(crate) fn short(name: &str) -> &str {
         "inbetweenVisibility" => "ibvs",
         "weight" => "w",
         "envelope" => "en",
+        "drawOverride" => "do",
+        "drawInfo" => "di",
         "inputTarget" => "it",
         "inputTargetGroup" => "itg",
         "inputTargetItem" => "iti",

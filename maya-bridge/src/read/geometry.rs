@@ -96,7 +96,8 @@ pub(super) fn history(scene: &Scene, mesh: NodeId) -> History {
             (Data::Mesh(data), _) => {
                 if !data.points.is_empty() {
                     history.base = Some(at);
-                    history.tweaks.extend((!data.tweaks.is_empty()).then_some((at, 0)));
+                    let own = !data.tweaks.is_empty() && scene.source(at, "twl").is_none();
+                    history.tweaks.extend(own.then_some((at, 0)));
                     return history;
                 }
                 source = scene.source(at, "i");

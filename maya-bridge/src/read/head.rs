@@ -133,7 +133,9 @@ fn chosen(scene: &Scene, options: &Options) -> Result<Vec<Instance>, Fault> {
 
 fn is_visible(scene: &Scene, instance: &Instance) -> bool {
     scene.mesh(instance.mesh).is_some_and(|m| !m.hidden)
-        && instance.above.iter().all(|id| scene.transform(*id).is_none_or(|t| t.visible))
+        && scene.is_drawn(instance.mesh)
+        && (instance.above.iter())
+            .all(|id| scene.is_drawn(*id) && scene.transform(*id).is_none_or(|t| t.visible))
 }
 
 struct Assembly<'s> {

@@ -136,7 +136,7 @@ const UNITS: [Unit; 4] = [
     Unit { name: "microseconds", seconds: 1e-6 },
     Unit { name: "nanoseconds", seconds: 1e-9 },
 ];
-/// Samples of a face are never further apart than this, nor nearer than a thousandth of it.
+/// Samples of a face are not further apart than this: the largest unit in which a median step is not longer is taken.
 const LONGEST_STEP_S: f64 = 1.0;
 
 impl Unit {
@@ -171,14 +171,11 @@ impl Unit {
         let mut steps: Vec<f64> = numbers.windows(2).map(|w| w[1] - w[0]).filter(|s| *s > 0.0).collect();
         let named = Self::of_name(name);
         let Some(step) = median(&mut steps) else { return (named.unwrap_or(SECONDS), None) };
-        let fits = |unit: &Self| {
-            let step_s = step * unit.seconds;
-            step_s > 1e-4 * LONGEST_STEP_S && step_s <= 60.0 * LONGEST_STEP_S
-        };
+        // Wider than for a guess: somebody wrote the name.
+        let fits = |unit: &Self| (1e-4..=60.0 * LONGEST_STEP_S).contains(&(step * unit.seconds));
         if let Some(unit) = named.filter(fits) {
             return (unit, None);
         }
-        // The first samples of a recorder may come in a burst, so short steps are no reason for another unit.
         let unit = UNITS.into_iter().find(|unit| step * unit.seconds <= LONGEST_STEP_S).unwrap_or(UNITS[3]);
         let note = match named {
             Some(named) if named != unit => Some(format!(
@@ -197,6 +194,8 @@ impl Unit {
 
 /// Samples after a step back within which a clock that was not set back has caught up.
 const REORDERED: usize = 3;
+/// A longer step than this is told, if it is longer than the others.
+const GAP_S: f64 = 0.25;
 /// Two samples nearer in time than this are one.
 const SAME_S: f64 = 1e-6;
 const DAY_S: f64 = 86_400.0;
@@ -262,7 +261,7 @@ impl Timeline {
             ));
         }
         let gap = this.times_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-        if gap > LONGEST_STEP_S.min(0.25) && gap > 1.5 * step {
+        if gap > GAP_S && gap > 1.5 * step {
             this.notes.push(format!("a gap of {gap:.2} s was bridged by a straight line"));
         }
         this
