@@ -97,7 +97,8 @@ mod tests {
             assert_eq!(plain_names([name]), [name]);
         }
         let long = "ä".repeat(500);
-        let again = [hostile.as_slice(), &hostile, &["joy", "Joy", "joy_1", long.as_str(), long.as_str()]].concat();
+        let again =
+            [hostile.as_slice(), &hostile, &["joy", "Joy", "joy_1", long.as_str(), long.as_str()]].concat();
         let plain = plain_names(again.iter().copied());
         let different: HashSet<String> = plain.iter().map(|n| n.to_lowercase()).collect();
         assert_eq!(different.len(), again.len(), "{plain:?}");

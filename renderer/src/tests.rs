@@ -21,7 +21,7 @@ use crate::settings::{
 };
 use crate::testing::{assert_layout, assert_raster, assert_workgroups, gpu, offsets, own_gpu};
 use crate::{
-    Camera, ColorTable, EnvironmentMap, FrameStats, HeadInstance, HeadOnGpu, Image, Light, LightKind,
+    Camera, ColorTable, EnvironmentMap, FrameStats, Gpu, HeadInstance, HeadOnGpu, Image, Light, LightKind,
     RenderError, Renderer, Scene,
 };
 
@@ -586,4 +586,89 @@ fn velocity_is_the_motion_of_the_point_that_a_pixel_sees() {
         fastest = fastest.max(expected.length());
     }
     assert!(compared > 300 && fastest > 1.0, "{compared} pixels, up to {fastest} pixels fast");
+}
+
+#[test]
+fn a_frame_goes_into_commands_and_a_texture_of_somebody_else() {
+    let Some(gpu) = own_gpu() else { return };
+    let given = Gpu::from_device(gpu.device.clone(), gpu.queue.clone(), gpu.info.clone());
+    let mut renderer = Renderer::new(given).expect("the passes compile");
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(&gpu, &head, &WHITE_TABLE).expect("the dome uploads");
+    let state = FaceState::neutral(&head);
+    let heads = [HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }];
+    let scene = Scene {
+        heads: &heads,
+        camera: CAMERA,
+        lights: &[lamp()],
+        environment: None,
+        environment_rotation: 0.0,
+        environment_intensity: 0.0,
+        background_linear: Vec3::splat(0.1),
+    };
+    let texture =
+        |format, usage| gpu.target("given", [51, 27], format, usage | wgpu::TextureUsages::COPY_SRC);
+    for antialias in [AntialiasMethod::None, AntialiasMethod::SmaaS2x, AntialiasMethod::Ssaa(2)] {
+        let mut settings = settings([51, 27]);
+        settings.quality.antialias = antialias;
+        let own = render(&mut renderer, &scene, &settings).expect("it draws").0;
+        let target = texture(wgpu::TextureFormat::Rgba8Unorm, wgpu::TextureUsages::STORAGE_BINDING);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        renderer.record(&mut encoder, &scene, &settings, &target).expect("it records");
+        gpu.queue.submit([encoder.finish()]);
+        let given = native::wait(&gpu, gpu.read_texture(&target)).expect("it reads");
+        assert_eq!(given, own.rgba, "{antialias}");
+    }
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let wrong = texture(wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING);
+    let message =
+        renderer.record(&mut encoder, &scene, &settings([51, 27]), &wrong).expect_err("it is refused");
+    assert!(message.to_string().contains("Rgba8Unorm"), "{message}");
+    let mut reference = settings([51, 27]);
+    reference.quality.scatter = ScatterMethod::ReferenceSurface(1);
+    let message = renderer.draw(&scene, &reference).err().expect("it does not draw in one go").to_string();
+    assert!(message.contains("in one go"), "{message}");
+}
+
+#[test]
+fn a_frame_can_be_drawn_while_the_one_before_is_read() {
+    let Some(mut renderer) = renderer() else { return };
+    let gpu = renderer.gpu().clone();
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(&gpu, &head, &WHITE_TABLE).expect("the dome uploads");
+    let mut settings = settings([48, 32]);
+    settings.quality.antialias = AntialiasMethod::SmaaT2x;
+    let states: Vec<FaceState> = (0..5)
+        .map(|i| FaceState { shapes: vec![0.2 * i as f32, 0.1], ..FaceState::neutral(&head) })
+        .collect();
+    let mut film = |overlaps: bool| {
+        renderer.cut(0);
+        let (mut waiting, mut pictures) = (Vec::new(), Vec::new());
+        for state in &states {
+            let scene = Scene {
+                heads: &[HeadInstance { head: &on_gpu, state, world_from_head: Mat4::IDENTITY }],
+                camera: CAMERA,
+                lights: &[lamp()],
+                environment: None,
+                environment_rotation: 0.0,
+                environment_intensity: 0.0,
+                background_linear: Vec3::ZERO,
+            };
+            waiting.push(renderer.draw(&scene, &settings).expect("it draws"));
+            while waiting.len() > 2 * usize::from(overlaps) {
+                let (image, _, channels) =
+                    native::wait(&gpu, waiting.remove(0).finish_with_channels()).expect("it is read");
+                pictures.push((image, channels));
+            }
+        }
+        for drawn in waiting {
+            let (image, _, channels) = native::wait(&gpu, drawn.finish_with_channels()).expect("it is read");
+            pictures.push((image, channels));
+        }
+        pictures
+    };
+    let one_by_one = film(false);
+    assert_eq!(one_by_one.len(), 5);
+    assert_ne!(one_by_one[1].0, one_by_one[4].0, "the film moves");
+    assert!(film(true) == one_by_one, "pictures and channels are those of their own frame");
 }

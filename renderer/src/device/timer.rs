@@ -145,3 +145,33 @@ impl PendingTimes {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::native;
+    use crate::testing::gpu;
+
+    #[test]
+    fn no_pass_is_lost_however_many_there_are() {
+        let Some(gpu) = gpu() else { return };
+        if !gpu.has_timestamps {
+            crate::testing::skipped("this device has no timestamps");
+            return;
+        }
+        let mut timer = PassTimer::default();
+        for count in [0, 1, PASSES_PER_SET, 2 * PASSES_PER_SET + 22] {
+            timer.restart();
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            for i in 0..count {
+                drop(timer.compute(gpu, &mut encoder, if i % 2 == 0 { "even" } else { "odd" }));
+            }
+            let pending = timer.finish(gpu, &mut encoder);
+            gpu.queue.submit([encoder.finish()]);
+            let times = native::wait(gpu, pending.read()).expect("times come back");
+            assert_eq!(times.passes_ms.len(), count);
+            assert_eq!(times.passes_ms.iter().filter(|(name, _)| *name == "odd").count(), count / 2);
+            assert!(times.passes_ms.iter().all(|(_, ms)| *ms < 1e4), "{times:?}");
+        }
+    }
+}
