@@ -127,6 +127,12 @@ impl Material {
     }
 }
 
+/// Texture radius of the limbus, the rim of the iris, on every eye ([`Material::Eye`]): that of an anatomical one, an iris
+/// of 5.9 mm radius on a ball of 12 mm, asin(5.9 / 12) / (2 pi).
+pub const LIMBUS_UV: f32 = 0.0819;
+/// Radius of the ball of that eye, mm.
+pub const EYE_RADIUS_MM: f32 = 12.0;
+
 /// A named displacement of some points. The offset at weight w is w times the offset here.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BlendShape {

@@ -5,9 +5,8 @@ use std::f32::consts::PI;
 use glam::{Vec2, Vec3};
 use nalgebra::{DMatrix, DVector};
 
-/// Texture radius of the limbus: that of an anatomical eye, an iris of 5.9 mm radius on a ball of 12 mm:
-/// asin(5.9 / 12) / (2 pi). Angles are stretched so that it is the same for every eye, whatever the size of its ball.
-pub(crate) const LIMBUS_UV: f32 = 0.0819;
+/// Angles are stretched so that the limbus is there on every eye, whatever the size of its ball.
+pub(crate) use rubor_rig::head::LIMBUS_UV;
 
 /// Radius of the iris where it meets the white, metres (visible iris diameter 11.8 mm).
 pub(super) const LIMBUS_RADIUS: f32 = 0.0059;

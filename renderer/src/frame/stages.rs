@@ -7,8 +7,8 @@ use crate::error::RenderError;
 use crate::passes::antialias::{self, History, Subsample};
 use crate::passes::shade::{Lighting, Lit};
 use crate::scene::lamp::{Illumination, place_lights};
-use crate::scene::placement::{average_light, pixels_per_mm, receivers};
-use crate::scene::view::{Seen, view};
+use crate::scene::placement::{average_light, receivers};
+use crate::scene::view::{Seen, pixels_per_mm, view};
 
 /// What the samples of a pixel have come to so far.
 #[derive(Default)]

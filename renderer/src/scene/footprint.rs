@@ -5,9 +5,16 @@
 //! hold 4 x 4 texels; a level smaller than that still takes a whole block.
 
 use rubor_rig::head::SkinMaps;
+use rubor_rig::map::Map;
 use serde::Serialize;
 
-use super::head::{APPEARANCE_SIZE, largest_of};
+/// Side of the maps that are blended for each frame (256 in papers/004 section 7.6).
+pub(crate) const APPEARANCE_SIZE: u32 = 256;
+
+/// The size that holds all of some maps: at least one texel.
+pub(crate) fn largest_of<'a>(maps: impl IntoIterator<Item = &'a Map>) -> [u32; 2] {
+    maps.into_iter().fold([1, 1], |s, m| [s[0].max(m.width), s[1].max(m.height)])
+}
 
 /// One texture of a head.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

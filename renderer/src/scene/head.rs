@@ -8,7 +8,7 @@ use rubor_rig::mask::{Mask, resize_area};
 use wgpu::util::DeviceExt;
 
 use super::clusters::{Cluster, clusters};
-use super::footprint::mask_size;
+use super::footprint::{APPEARANCE_SIZE, largest_of, mask_size};
 use super::hair_roots::roots;
 use crate::device::Gpu;
 use crate::device::texture::{self, Texel};
@@ -26,8 +26,6 @@ pub(crate) const MAX_SHAPES: usize = 1 << 12;
 pub const MAX_DISTRIBUTIONS: usize = 64;
 /// Wrinkle zones that one head can have.
 pub const MAX_ZONES: usize = 64;
-/// Side of the maps that are blended for each frame (256 in papers/004 section 7.6).
-pub(crate) const APPEARANCE_SIZE: u32 = 256;
 
 /// Skin colour as a function of chromophores: columns are the cube root of melanin / 0.5, rows the cube root of
 /// hemoglobin / 0.32 (papers/004 eq. 7.7); the first and last texel stand at 0 and 1.
@@ -430,11 +428,6 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
         masks: texture::array_view(&texture::upload_bytes::<4>(gpu, "zone masks", mask_size, &masks)),
         zone_maps: maps.zones.iter().map(|z| z.wrinkle_map).collect(),
     })
-}
-
-/// The size that holds all of some maps: at least one texel.
-pub(crate) fn largest_of<'a>(maps: impl IntoIterator<Item = &'a Map>) -> [u32; 2] {
-    maps.into_iter().fold([1, 1], |s, m| [s[0].max(m.width), s[1].max(m.height)])
 }
 
 /// Texels of an image of this size from a function of texture space.

@@ -3,7 +3,8 @@
 use glam::Mat4;
 use rubor_rig::face_state::FaceState;
 
-use super::head::{APPEARANCE_SIZE, HeadOnGpu};
+use super::footprint::APPEARANCE_SIZE;
+use super::head::HeadOnGpu;
 use super::placement::world_from_head;
 use super::{HeadInstance, Scene};
 use crate::device::{Gpu, Image, ImageSpec};

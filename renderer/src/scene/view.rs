@@ -2,8 +2,8 @@
 
 use glam::{Mat4, Vec3};
 
-use super::placement::head_depths;
-use super::{Light, NEAR_METRES, Scene};
+use super::placement::world_from_head;
+use super::{HeadInstance, Light, NEAR_METRES, Scene};
 use crate::device::Image;
 
 /// The view as view.wesl reads it.
@@ -72,4 +72,20 @@ pub(crate) fn view(
         depth_origin_mm: 1000.0 * head_depths(scene, view_from_world).reduce(f32::min).unwrap_or(0.0),
         environment_turn: scene.environment_rotation / (2.0 * std::f32::consts::PI),
     }
+}
+
+/// View depths of the heads before the camera, between middle and front, metres.
+fn head_depths<'a>(scene: &'a Scene<'_>, view_from_world: Mat4) -> impl Iterator<Item = f32> + 'a {
+    let depth = move |instance: &HeadInstance<'_>| {
+        let (low, high) = instance.head.bounds;
+        let middle = world_from_head(instance).transform_point3(0.5 * (low + high));
+        -view_from_world.transform_point3(middle).z - 0.25 * (high - low).min_element()
+    };
+    scene.heads.iter().map(depth).filter(|d| *d > 0.0)
+}
+
+/// Pixels for a millimetre of the farthest head; 1 where none is before the camera.
+pub(crate) fn pixels_per_mm(scene: &Scene<'_>, view: &View) -> f64 {
+    let farthest = head_depths(scene, scene.camera.view_from_world()).reduce(f32::max);
+    farthest.map_or(1.0, |depth| f64::from(view.origin[3]) / (1000.0 * f64::from(depth)))
 }

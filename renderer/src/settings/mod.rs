@@ -17,6 +17,7 @@
 //! # Ok::<(), rubor_renderer::settings::SettingsError>(())
 //! ```
 
+mod antialias;
 mod leaves;
 pub mod methods;
 mod profile;
@@ -26,14 +27,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::channels::Channel;
+pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
     AntialiasMethod, ColorMethod, GROUPS, Group, Method, ScatterMethod, SpecularMethod, Stage, ToneMap,
     TransmitMethod, UnknownMethod, WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
-
-use crate::passes::antialias;
 
 /// How frames are made.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -81,9 +81,9 @@ pub struct Quality {
     /// Antialiasing of the displayed picture
     pub antialias: AntialiasMethod,
     /// Thresholds and search lengths of the antialiasing
-    pub antialias_preset: antialias::Preset,
+    pub antialias_preset: AntialiasPreset,
     /// Which patterns of edges stand for which contours; published is for comparisons with the published tables
-    pub antialias_patterns: antialias::Patterns,
+    pub antialias_patterns: AntialiasPatterns,
     /// How far light goes in skin, for every scattering method
     pub profile: DiffusionProfile,
     /// Texels on a side of a shadow map
@@ -150,8 +150,8 @@ impl Default for Quality {
             wrinkles: WrinkleMethod::PartialDerivative,
             specular: SpecularMethod::OneLobe,
             antialias: AntialiasMethod::SmaaS2x,
-            antialias_preset: antialias::Preset::High,
-            antialias_patterns: antialias::Patterns::Revised,
+            antialias_preset: AntialiasPreset::High,
+            antialias_patterns: AntialiasPatterns::Revised,
             profile: DiffusionProfile::default(),
             shadow_size: 2048,
         }
@@ -215,16 +215,6 @@ impl Settings {
     /// Pixels that the passes before the resolve draw.
     pub fn frame_size(&self) -> [u32; 2] {
         self.output.size.map(|n| n * self.samples_per_side())
-    }
-
-    /// What the antialiasing pass is given.
-    pub fn antialias(&self) -> antialias::Settings {
-        let mode = self.quality.antialias.into();
-        let preset = self.quality.antialias_preset;
-        match self.quality.antialias_patterns {
-            antialias::Patterns::Revised => antialias::Settings::new(mode, preset),
-            antialias::Patterns::Published => antialias::Settings::published(mode, preset),
-        }
     }
 
     /// Replaces what a JSON object of the same shape names; the rest stays.

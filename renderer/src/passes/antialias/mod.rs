@@ -253,7 +253,7 @@ impl Antialias {
             let plain = settings.predication.map_or(1.0, |p| p.scale);
             let relief = settings.predication.map_or(0.0, |p| p.strength);
             let thresholds = [plain, plain * (1.0 - relief)];
-            let (back, ahead) = reference::search_limits(settings);
+            let (back, ahead) = settings::search_limits(settings);
             let depth_threshold = match (settings.edges, settings.predication) {
                 (EdgeSource::Depth, _) | (_, None) => settings.depth_threshold,
                 (_, Some(predication)) => predication.depth_threshold,

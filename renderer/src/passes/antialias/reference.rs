@@ -3,7 +3,9 @@
 //! The image is continued by its border pixels, so outside of it there are no new edges and lines run on.
 
 use super::lookups::{AreaTable, DIAGONAL_SLOT};
-use super::settings::{Alpha, BlendSpace, EdgeSource, Encoding, Mode, Patterns, Settings, Subsample};
+use super::settings::{
+    Alpha, BlendSpace, EdgeSource, Encoding, Mode, Patterns, Settings, Subsample, search_limits,
+};
 use super::tables::Tables;
 use rayon::prelude::*;
 
@@ -229,17 +231,6 @@ impl Stop {
             (_, Patterns::Published) => Self::AtCrossings,
             (_, Patterns::Revised) => Self::AtTurns,
         }
-    }
-}
-
-/// Longest distances searched, backwards and forwards: the published searches fetch pairs of pixels, so to the left
-/// (and up) the last step ends one pixel short.
-pub(super) fn search_limits(settings: &Settings) -> (u32, u32) {
-    let limit = 2 * settings.search_steps;
-    if settings.mode == Mode::Mlaa || settings.patterns == Patterns::Revised {
-        (limit, limit)
-    } else {
-        (limit - 1, limit)
     }
 }
 

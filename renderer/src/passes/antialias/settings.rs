@@ -1,9 +1,9 @@
 //! What to antialias by: modes, presets and every single setting.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::settings::AntialiasMethod;
+pub use crate::settings::{AntialiasPatterns as Patterns, AntialiasPreset as Preset};
 
 /// Antialiasing methods of chapters 9 and 10, by the names that files and the command use. Supersampling
 /// (`ssaa:N`) belongs to the frame, since it draws more pixels instead of filtering them.
@@ -154,22 +154,6 @@ pub enum Alpha {
     Associated,
 }
 
-/// Which patterns of edges stand for which contours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Patterns {
-    /// The same for images however they are turned or mirrored, and closer to the contours:
-    /// - a diagonal is a stair of at least five edges between two longer steps of the same direction, which is what a
-    ///   straight line leaves; all other stairs go through the middles of their risers like any line;
-    /// - areas are exact, and short steps that turn back are not blended more than their area;
-    /// - lines run on where two contours of more than one pixel cross;
-    /// - where both directions weigh the same, both are taken.
-    #[default]
-    Revised,
-    /// As the published shader has them, for comparisons.
-    Published,
-}
-
 /// Makes colour edges count more where depth jumps too: the threshold is raised everywhere and lowered there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Predication {
@@ -185,21 +169,6 @@ impl Default for Predication {
     fn default() -> Self {
         Self { depth_threshold: 0.01, scale: 2.0, strength: 0.4 }
     }
-}
-
-/// Quality of SMAA as published: threshold, search steps of two pixels, diagonal steps, corner rounding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Preset {
-    /// 0.15, 4 steps, no diagonals, no corners.
-    Low,
-    /// 0.1, 8 steps, no diagonals, no corners.
-    Medium,
-    /// 0.1, 16 steps, 8 diagonal steps, corners rounded by a quarter (1x: see [`Settings::new`]).
-    #[default]
-    High,
-    /// 0.05, 32 steps, 16 diagonal steps, corners rounded by a quarter (1x: see [`Settings::new`]).
-    Ultra,
 }
 
 /// Everything that decides what the pass does.
@@ -230,6 +199,18 @@ pub struct Settings {
     pub alpha: Alpha,
     /// Where neighbours are mixed.
     pub blend_space: BlendSpace,
+}
+
+impl crate::settings::Settings {
+    /// What the pass is given.
+    pub fn antialias(&self) -> Settings {
+        let mode = self.quality.antialias.into();
+        let preset = self.quality.antialias_preset;
+        match self.quality.antialias_patterns {
+            Patterns::Revised => Settings::new(mode, preset),
+            Patterns::Published => Settings::published(mode, preset),
+        }
+    }
 }
 
 impl Default for Settings {
@@ -313,5 +294,16 @@ impl Settings {
     /// Whether the pass reads depth.
     pub fn needs_depth(&self) -> bool {
         self.edges == EdgeSource::Depth || self.predication.is_some()
+    }
+}
+
+/// Longest distances searched, backwards and forwards: the published searches fetch pairs of pixels, so to the left
+/// (and up) the last step ends one pixel short.
+pub(super) fn search_limits(settings: &Settings) -> (u32, u32) {
+    let limit = 2 * settings.search_steps;
+    if settings.mode == Mode::Mlaa || settings.patterns == Patterns::Revised {
+        (limit, limit)
+    } else {
+        (limit - 1, limit)
     }
 }

@@ -25,7 +25,7 @@ impl Tables {
             blocks
         };
         let (orthogonal_blocks, diagonal_blocks) = (used([0, 1]), used([2, 3]));
-        let (_, longest) = super::reference::search_limits(settings);
+        let (_, longest) = super::settings::search_limits(settings);
         let areas = if settings.mode == Mode::Mlaa {
             AreaTable::mlaa(&mlaa_area_texture())
         } else if settings.patterns == Patterns::Published {

@@ -16,7 +16,8 @@
 
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Kernel, Recorder};
-use crate::scene::head::{APPEARANCE_SIZE, MapsOnGpu};
+use crate::scene::footprint::APPEARANCE_SIZE;
+use crate::scene::head::MapsOnGpu;
 use crate::scene::posed_head::wrinkle_layers;
 use crate::scene::{MAX_DISTRIBUTIONS, MAX_ZONES, PosedHead};
 use crate::settings::ColorMethod;

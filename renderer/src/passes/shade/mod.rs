@@ -58,7 +58,7 @@ pub(crate) mod reference;
 mod tests;
 
 use glam::{Vec3, Vec4};
-use rubor_rig::head::Material;
+use rubor_rig::head::{EYE_RADIUS_MM, LIMBUS_UV, Material};
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::skin::transmittance::TransmittanceTable;
 
@@ -107,6 +107,8 @@ fn with_constants(program: Program) -> Program {
         .constant("SKIN", Material::Skin.number())
         .constant("MUCOSA", Material::Mucosa.number())
         .constant("EYE", Material::Eye.number())
+        .constant("EYE_RADIUS_MM", EYE_RADIUS_MM)
+        .constant("IRIS_ANGLE", LIMBUS_UV * std::f32::consts::TAU)
         .constant("TEETH", Material::Teeth.number())
         .constant("GUMS", Material::Gums.number())
 }

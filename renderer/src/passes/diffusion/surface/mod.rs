@@ -18,6 +18,7 @@
 
 use glam::{Mat4, Vec3};
 use rubor_rig::head::Material;
+use rubor_rig::random::SplitMix64;
 use rubor_rig::skin::profile::Profile;
 
 use crate::device::readback::Readback;
@@ -158,9 +159,9 @@ impl Skin {
     /// Samples of batch number `batch`: evenly along the sum of areas, so that each triangle has its share to within
     /// one sample, at random places of the triangle.
     fn batch(&self, batch: u32, count: usize, grid: &Grid) -> Batch {
-        let mut random = Random(0x9E37_79B9_7F4A_7C15 ^ (u64::from(batch) << 32));
+        let mut random = SplitMix64(0x9E37_79B9_7F4A_7C15 ^ (u64::from(batch) << 32));
         let step = self.total_mm2() / count as f64;
-        let shift = random.next();
+        let shift = random.uniform();
         let mut triangle = 0;
         let mut cells = Vec::with_capacity(count);
         let mut unsorted = Vec::with_capacity(count);
@@ -171,7 +172,7 @@ impl Skin {
             }
             let (index, corners) = self.triangles[triangle];
             // Uniform over the triangle: the square folded along its diagonal.
-            let (mut u, mut v) = (random.next() as f32, random.next() as f32);
+            let (mut u, mut v) = (random.uniform() as f32, random.uniform() as f32);
             if u + v > 1.0 {
                 (u, v) = (1.0 - u, 1.0 - v);
             }
@@ -200,19 +201,6 @@ impl Skin {
             next[*c as usize] += 1;
         }
         Batch { samples, starts }
-    }
-}
-
-/// splitmix64: 0 to 1.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 
