@@ -1,4 +1,4 @@
-//! Where the camera, the heads, the lamps and their shadow maps of a frame stand.
+//! Placement of the camera, the heads, the lamps and their shadow maps in a frame.
 
 use glam::{Mat4, Vec3};
 
@@ -6,7 +6,7 @@ use super::clusters::{self, Sphere, Viewer};
 use super::view::View;
 use super::{HeadInstance, Light, LightKind, Scene};
 
-/// View depths of the heads before the camera, between middle and front, metres.
+/// View depths, between middle and front, of the heads in front of the camera, metres.
 pub(crate) fn head_depths<'a>(scene: &'a Scene<'_>, view_from_world: Mat4) -> impl Iterator<Item = f32> + 'a {
     let depth = move |instance: &HeadInstance<'_>| {
         let (low, high) = instance.head.bounds;
@@ -16,7 +16,7 @@ pub(crate) fn head_depths<'a>(scene: &'a Scene<'_>, view_from_world: Mat4) -> im
     scene.heads.iter().map(depth).filter(|d| *d > 0.0)
 }
 
-/// Pixels for a millimetre of the farthest head; 1 where none is before the camera.
+/// Pixels per millimetre of the farthest head; 1 if no head is in front of the camera.
 pub(crate) fn pixels_per_mm(scene: &Scene<'_>, view: &View) -> f64 {
     let farthest = head_depths(scene, scene.camera.view_from_world()).reduce(f32::max);
     farthest.map_or(1.0, |depth| f64::from(view.origin[3]) / (1000.0 * f64::from(depth)))
@@ -28,8 +28,8 @@ pub(crate) fn world_from_head(instance: &HeadInstance<'_>) -> Mat4 {
         * Mat4::from_rotation_translation(instance.state.head_rotation, instance.state.head_translation)
 }
 
-/// Where the heads are lit for a picture of a size: what the camera sees of them, `margin` times the picture, and what is
-/// turned away where `sees_backs`.
+/// The parts of the heads that are lit for a picture of a size: those in the camera's view, `margin` times as large as
+/// the picture, and those that face away if `sees_backs`.
 pub(crate) fn receivers(scene: &Scene<'_>, size: [u32; 2], margin: f32, sees_backs: bool) -> Vec<Sphere> {
     let [width, height] = size;
     let clip_from_view = scene.camera.clip_from_view(width as f32 / height as f32);
