@@ -1,6 +1,6 @@
-//! Error of every antialiasing mode on scenes of which every point is known, against 16 x 16 samples a pixel, and how
-//! far the modes depend on how an image is turned. Prints the tables of `docs/antialiasing.md` and writes its plot
-//! into the folder named on the command line.
+//! Error of every antialiasing mode on analytic scenes against 16 x 16 samples per pixel, and how much the result of
+//! each mode changes when an image is rotated. Prints the tables of `docs/antialiasing.md` and writes its plot into the
+//! folder named on the command line.
 //!
 //! The scenes are filtered by the CPU reference, which the kernels equal (tests of the renderer).
 
@@ -96,7 +96,7 @@ fn truth(scene: &Scene) -> Vec<f32> {
         .collect()
 }
 
-/// What a still scene looks like once history is there.
+/// A still scene after the history has converged.
 fn result(scene: &Scene, tables: &Tables, settings: &Settings) -> Picture {
     let frame = |frame| {
         let samples = settings.mode.subsamples(frame);

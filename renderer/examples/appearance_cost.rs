@@ -1,8 +1,8 @@
 //! Milliseconds of the appearance pass by the number of distributions and of wrinkle zones:
 //! `cargo run --release -p rubor-renderer --example appearance_cost [ADAPTER]`.
 //!
-//! Prints what the device's timestamps say of the pass and the wall clock of a whole frame of 16 x 16 pixels: a software
-//! device stamps when it takes work in, not when it does it.
+//! Prints the time of the pass by the device's timestamps and the wall-clock time of a whole frame of 16 x 16 pixels: a
+//! software device writes timestamps when it accepts work, not when it does it.
 
 use glam::{Mat4, Vec2, Vec3};
 use rubor_renderer::settings::{

@@ -1,13 +1,14 @@
-//! What can be read of a frame besides its picture: one table of name, extent, components, unit and space.
+//! Channels: the data of a frame that can be read besides its picture, in one table of name, extent, components, unit
+//! and space.
 //!
 //! A frame keeps the channels that [`crate::settings::Output::channels`] names; [`crate::Renderer::read`] brings them
-//! back as numbers. With two samples per pixel a channel is that of the last sample; with supersampling it has the
-//! pixels that the frame draws.
+//! back as numbers. With two samples per pixel a channel holds the last sample; with supersampling it has the size of
+//! the supersampled frame.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Over what a channel has values.
+/// The elements for which a channel has values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Pixels of the frame, rows from the top.
@@ -52,11 +53,11 @@ pub enum Channel {
 /// A row of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelRow {
-    /// Which.
+    /// The channel.
     pub channel: Channel,
-    /// Over what.
+    /// The elements that it has values for.
     pub extent: Extent,
-    /// Names of the components as [`ChannelData`] has them.
+    /// Names of the components, in the order of [`ChannelData`].
     pub components: &'static [&'static str],
     /// Unit of a component.
     pub unit: &'static str,
@@ -98,7 +99,7 @@ const fn row(
 }
 
 impl Channel {
-    /// Its row.
+    /// Its row of the table.
     pub fn row(self) -> &'static ChannelRow {
         let mut i = 0;
         while CHANNELS[i].channel != self {
@@ -116,11 +117,11 @@ impl Channel {
 /// The numbers of a channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelData {
-    /// Which.
+    /// The channel.
     pub channel: Channel,
     /// Columns and rows; points and vertices are one row.
     pub size: [u32; 2],
-    /// Components of a value after the other, as [`ChannelRow::components`] names them; ids keep their bits
+    /// Values with interleaved components, in the order of [`ChannelRow::components`]; ids keep their bits
     /// (`f32::to_bits`).
     pub values: Vec<f32>,
 }
@@ -129,7 +130,7 @@ impl ChannelData {
     /// Values of `N` components.
     ///
     /// # Panics
-    /// `N` is not the number of components of the channel.
+    /// `N` differs from the number of components of the channel.
     pub fn texels<const N: usize>(&self) -> impl ExactSizeIterator<Item = [f32; N]> + '_ {
         assert_eq!(N, self.channel.row().components.len(), "components of {}", self.channel.name());
         self.values.chunks_exact(N).map(|c| std::array::from_fn(|i| c[i]))

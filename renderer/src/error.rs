@@ -1,37 +1,37 @@
-//! Errors of the renderer, in words a person can act on.
+//! Errors of the renderer, with a hint what to do.
 
 /// Why a device or a frame could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
-    /// No Vulkan, Metal or DX12 driver answered.
+    /// No Vulkan, Metal or DX12 driver was found.
     #[error(
         "no graphics adapter found; without a GPU install a software driver (Debian and Ubuntu: mesa-vulkan-drivers)"
     )]
     NoAdapter,
-    /// `--adapter` named none of those that exist.
+    /// `--adapter` matches no adapter.
     #[error("no adapter matches {wanted:?}; there are: {}", found.join(", "))]
     UnknownAdapter {
-        /// What was asked for.
+        /// The name that was asked for.
         wanted: String,
-        /// Names of those that exist, with their index.
+        /// Names of the adapters, with their index.
         found: Vec<String>,
     },
-    /// The adapter exists but would not open.
+    /// The adapter exists but did not open.
     #[error("adapter {adapter} refused to open a device: {reason}")]
     Device {
         /// Name of the adapter.
         adapter: String,
-        /// What the driver said.
+        /// The driver's message.
         reason: String,
     },
     /// A size, count or value outside what the device or the method allows.
     #[error("{what} is {found}; {expected}")]
     Limit {
-        /// What is limited.
+        /// The quantity that is limited.
         what: &'static str,
-        /// What was asked for.
+        /// The value that was asked for.
         found: String,
-        /// The range, and where it comes from.
+        /// The range, and its source.
         expected: String,
     },
     /// The head breaks a rule of [`rubor_rig::head::Head`].
@@ -46,7 +46,7 @@ pub enum RenderError {
     /// A setting out of range.
     #[error(transparent)]
     Settings(#[from] crate::settings::SettingsError),
-    /// A method that the table does not have, or its number out of range.
+    /// A method that is not in the table, or a number out of range.
     #[error(transparent)]
     Method(#[from] crate::settings::UnknownMethod),
     /// The device stopped answering or ran out of memory.
@@ -54,13 +54,13 @@ pub enum RenderError {
     Lost(String),
 }
 
-/// What keeps the antialiasing pass from running.
+/// Errors of the antialiasing pass.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AntialiasError {
     /// A setting is out of range.
     #[error("antialias setting {name} is {found}, expected {expected}")]
     Setting {
-        /// Name in files.
+        /// Name of the setting in files.
         name: &'static str,
         /// Its value.
         found: f32,
@@ -70,26 +70,26 @@ pub enum AntialiasError {
     /// The image is empty or larger than the device takes.
     #[error("an image of {width} x {height} pixels cannot be antialiased, expected 1 to {limit} a side")]
     Size {
-        /// Pixels.
+        /// Width in pixels.
         width: u32,
-        /// Pixels.
+        /// Height in pixels.
         height: u32,
-        /// Pixels.
+        /// Largest side in pixels.
         limit: u32,
     },
-    /// Something the settings ask for was not handed over.
+    /// An input that the settings need is missing.
     #[error("{mode} with these settings takes {expected} {what}, found {found}")]
     Inputs {
         /// Name of the mode.
         mode: &'static str,
-        /// What it takes.
+        /// The kind of input.
         what: &'static str,
-        /// How many.
+        /// Number that is needed.
         expected: usize,
-        /// How many there are.
+        /// Number that was given.
         found: usize,
     },
-    /// Files have one sample a pixel and no previous frame.
+    /// Files have one sample per pixel and no previous frame.
     #[error("{mode} needs more than an image, expected mlaa or smaa-1x")]
     NotAFilter {
         /// Name of the mode.
@@ -98,7 +98,7 @@ pub enum AntialiasError {
     /// The output format cannot be written by a compute shader.
     #[error("antialiasing cannot write {found:?}, expected Rgba8Unorm, Rgba16Float or Rgba32Float")]
     Format {
-        /// What was asked for.
+        /// The format that was asked for.
         found: wgpu::TextureFormat,
     },
     /// The device failed.

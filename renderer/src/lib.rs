@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Where to look: [`settings`] defines every setting and the one table of methods; `frame/realtime.rs` is the order of a
-//! frame; each pass is a folder under `passes`; `device` opens devices, links shaders and records. The crate knows no file
-//! format and waits for no device; `native` does, for programs outside of a browser.
+//! frame; each pass is a folder under `passes`; `device` opens devices, links shaders and records. The crate reads no
+//! file format. It does not wait for the device, except in `native`, for programs outside of a browser.
 //!
 //! ```no_run
 //! use rubor_renderer::{Renderer, native};

@@ -28,7 +28,7 @@ pub struct Image {
     pub rgba: Vec<u8>,
 }
 
-/// What a frame cost.
+/// Cost of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FrameStats {
     /// GPU milliseconds of each pass, in order; empty where the adapter has no timestamps.
@@ -41,10 +41,10 @@ pub struct FrameStats {
     pub scatter_noise: Option<f64>,
 }
 
-/// Frames that [`Renderer::measure`] hands to the device before it waits: enough to keep it busy.
+/// Frames that [`Renderer::measure`] submits before it waits: enough to keep the device busy.
 const FRAMES_IN_FLIGHT: usize = 3;
 
-/// Draws scenes. Keeps pipelines, and images while frames ask for them; of frames only what antialiasing over time needs.
+/// Draws scenes. Keeps pipelines, images while frames use them, and the history of temporal antialiasing.
 pub struct Renderer {
     gpu: Gpu,
     passes: Passes,
@@ -53,14 +53,14 @@ pub struct Renderer {
     images: Images,
     timer: PassTimer,
     past: Past,
-    /// What the past belongs to.
+    /// The heads and the size that the history belongs to.
     past_shape: Option<([u32; 2], [u32; 2], antialias::Settings)>,
     checked: Option<Settings>,
     /// Channels of the last frame.
     kept: BTreeMap<Channel, FrameImage>,
 }
 
-/// A frame that was handed to the device.
+/// A submitted frame.
 pub struct Drawn {
     gpu: Gpu,
     submission: wgpu::SubmissionIndex,
@@ -70,7 +70,7 @@ pub struct Drawn {
     channels: Vec<(Channel, Copy)>,
 }
 
-/// Numbers of a channel on their way to the host.
+/// Numbers of a channel, being read back.
 enum Copy {
     Image(TextureReadback, wgpu::TextureFormat),
     Buffer(Readback),
@@ -103,7 +103,7 @@ impl Copy {
 }
 
 impl Drawn {
-    /// The picture and what it cost, once the device is done with it.
+    /// The picture and its cost, once the device is done with it.
     ///
     /// # Errors
     /// The device failed.
@@ -112,7 +112,7 @@ impl Drawn {
         Ok((image, stats))
     }
 
-    /// The same with the channels that the settings name, as far as the frame has them, in that order.
+    /// The same with the channels that the settings name, those that the frame has, in that order.
     ///
     /// # Errors
     /// The device failed.
@@ -157,15 +157,15 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Forgets the previous frame: call it at a cut, so that antialiasing over time mixes nothing into the next one.
-    /// `frame` is the number of the next frame: even and odd ones have their samples at other places.
+    /// Clears the history, for a cut: temporal antialiasing then mixes no previous frame into the next one.
+    /// `frame` is the number of the next frame: even and odd frames have different sample positions.
     pub fn cut(&mut self, frame: u64) {
         self.past = Past { frames: frame, ..Past::default() };
     }
 
-    /// Records a frame into commands of the caller, its picture into a texture of the caller: `Rgba8Unorm`, of the size in
-    /// the settings, usable as storage. Nothing is submitted and nothing is waited for. Frames follow one another until
-    /// [`Renderer::cut`]; the commands have to be submitted in their order.
+    /// Records a frame into the caller's encoder and its picture into the caller's texture: `Rgba8Unorm`, of the size
+    /// in the settings, usable as storage. Nothing is submitted and nothing is waited for. Frames follow one another
+    /// until [`Renderer::cut`]; the encoders have to be submitted in the order of the frames.
     ///
     /// # Errors
     /// A size, a count or a value outside the limits; a method that does not draw in one go; a texture that does not fit.
@@ -243,8 +243,8 @@ impl Renderer {
         self.hand_over(encoder, scene, settings, image, noise)
     }
 
-    /// Draws a scene `frames` times, one frame right after the other and without reading any picture, and says what each
-    /// cost; the first `warm_up` of them are left out. Empty where the adapter has no timestamps.
+    /// Draws a scene `frames` times, one frame right after the other and without reading any picture, and returns the
+    /// cost of each; the first `warm_up` frames are left out. Empty where the adapter has no timestamps.
     ///
     /// # Errors
     /// As [`Renderer::draw`]; the device failed.
@@ -305,7 +305,7 @@ impl Renderer {
         Ok(data)
     }
 
-    /// Copies a channel of the last frame, if that has it.
+    /// Copies a channel of the last frame, if the frame has it.
     fn copy(&self, encoder: &mut wgpu::CommandEncoder, channel: Channel) -> Option<Copy> {
         let of_head =
             |buffer: &wgpu::Buffer| Copy::Buffer(Readback::of_buffer(&self.gpu, &mut *encoder, buffer));
@@ -319,7 +319,7 @@ impl Renderer {
         }
     }
 
-    /// Checks a scene and makes what its frames need.
+    /// Checks a scene and makes the passes that its frames need.
     fn prepare(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
         if self.checked.as_ref() != Some(settings) {
             check_settings(&self.gpu, settings)?;

@@ -1,4 +1,4 @@
-//! What the tests of several passes share.
+//! Helpers that the tests of several passes share.
 
 use std::sync::OnceLock;
 
@@ -21,7 +21,7 @@ pub(crate) fn gpu() -> Option<&'static Gpu> {
     device.as_ref()
 }
 
-/// Says that a test cannot run. The test harness hides what passing tests print, but not what they write.
+/// Reports that a test cannot run. The test harness hides what passing tests print, but not what they write.
 pub(crate) fn skipped(why: &str) {
     let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("SKIPPED: {why}\n"));
 }
@@ -43,7 +43,7 @@ pub(crate) fn recorded<T>(gpu: &Gpu, work: impl FnOnce(&mut Recorder<'_>) -> T) 
     result
 }
 
-/// What a storage buffer holds.
+/// Contents of a storage buffer.
 pub(crate) fn read_storage<T: bytemuck::Pod>(gpu: &Gpu, buffer: &wgpu::Buffer) -> Vec<T> {
     bytemuck::pod_collect_to_vec(&native::wait(gpu, gpu.read_buffer(buffer)).expect("the buffer comes back"))
 }
@@ -106,7 +106,7 @@ fn assert_layout_of(wgsl: &str, structure: &str, size: usize, fields: &[(&str, u
     assert_eq!(members, fields, "fields of {structure}");
 }
 
-/// What shaders of the project may use: halves that are packed in words, and numbers of triangles (of which there is a
+/// Features that shaders of the project may use: half floats packed in words, and the primitive index (with a
 /// version without).
 const CAPABILITIES: naga::valid::Capabilities =
     naga::valid::Capabilities::PRIMITIVE_INDEX.union(naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32);

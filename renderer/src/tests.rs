@@ -1,4 +1,4 @@
-//! Shaders against Rust, kernels against the CPU, and what every frame keeps to.
+//! Shaders against Rust, kernels against the CPU, and invariants of every frame.
 
 use glam::{DVec3, Mat4, Quat, Vec2, Vec3};
 use rubor_rig::deform;
@@ -324,7 +324,8 @@ fn ambient_visibility_follows_the_shapes_as_on_the_cpu() {
 #[test]
 fn an_even_sky_comes_back_as_albedo_and_reflection_and_never_as_more() {
     let Some(mut renderer) = renderer() else { return };
-    // All that enters comes back, but for what is reflected in front: 1 - rho(normal) of the dome's gloss.
+    // All light that enters leaves again, except the share reflected at the surface: 1 - rho(normal) of the dome's
+    // gloss.
     let table = ColorTable { width: 2, height: 2, texels: &[[1.0; 3]; 4] };
     let head = dome();
     let white = HeadOnGpu::new(renderer.gpu(), &head, &table).expect("the dome uploads");
@@ -400,7 +401,7 @@ fn the_same_frame_twice_is_the_same_bytes() {
 
 #[test]
 fn a_white_furnace_returns_what_comes_in() {
-    // Diffuse light of a uniform sky on unoccluded skin: radiance 0.5 times albedo 0.8, whatever the scattering.
+    // Diffuse light of a uniform sky on unoccluded skin: radiance 0.5 times albedo 0.8, for every scattering method.
     let Some(mut renderer) = renderer() else { return };
     let mut head = dome();
     head.maps.specular = Some(Map::filled(1, 1, &[0.0, 0.3]));
@@ -564,7 +565,7 @@ fn velocity_is_the_motion_of_the_point_that_a_pixel_sees() {
         let clip = clip_from_world * p.extend(1.0);
         glam::DVec2::new(clip.x / clip.w * 0.5 + 0.5, 0.5 - clip.y / clip.w * 0.5) * f64::from(size)
     };
-    // Where in the pixel the second frame looks.
+    // Sample position of the second frame in the pixel.
     let offset_px = settings.antialias().mode.subsamples(1)[0].position_px;
     let (mut compared, mut fastest) = (0, 0.0f64);
     for (i, found) in velocity.iter().enumerate() {

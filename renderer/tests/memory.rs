@@ -43,12 +43,12 @@ fn resident() -> Option<u64> {
     text.split_whitespace().nth(1)?.parse::<u64>().ok().map(|pages| pages * 4096)
 }
 
-/// Says that the test cannot run. The test harness hides what passing tests print, but not what they write.
+/// Reports that the test cannot run. The test harness hides what passing tests print, but not what they write.
 fn skipped(why: &str) {
     let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("SKIPPED: {why}\n"));
 }
 
-/// Mesa's software driver compiled shaders anew for each value of a uniform and kept the code: 4 to 8 MB per frame.
+/// Mesa's software driver recompiled shaders for each value of a uniform and kept the code: 4 to 8 MB per frame.
 #[test]
 fn memory_stays_flat_over_frames() {
     if resident().is_none() {

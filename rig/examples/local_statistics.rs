@@ -1,7 +1,7 @@
 //! Times the local statistics of a map against a convolution by Fourier transforms and a direct sum, in one run:
 //! `local_statistics [SIDE [RADIUS]]`, default 4096 and 64.
 //!
-//! Prints seconds, the largest relative error of sigma against a sum in f64 about the mean, and bytes a pixel beyond
+//! Prints seconds, the largest relative error of sigma against a sum in f64 about the mean, and bytes per pixel beyond
 //! input and output (where /proc tells).
 
 use std::time::Instant;
@@ -35,9 +35,9 @@ fn main() {
     }
     let found = found.expect("three runs");
     let processor = processor_seconds().zip(processor).map(|(after, before)| (after - before) / 3.0);
-    // Output: two maps of f32 and a mask of bytes.
+    // The output: two maps of f32 and a mask of bytes.
     let beyond = peak_bytes().zip(before).map(|(after, before)| (after - before) / pixels - 9.0);
-    // Away from the borders, over which transforms see black.
+    // Away from the borders: beyond them the transforms read zeros.
     let inside = side - 2 * radius;
     let truth: Vec<_> = (0..64).map(|i| radius + (i * 61 + 7) * inside / 4000 % inside).collect();
     let expected: Vec<f64> = truth.iter().map(|x| direct(&map, radius, *x, side / 2).1).collect();
@@ -47,7 +47,7 @@ fn main() {
     };
     let own = error(&|i| f64::from(found.deviation.values[i]));
     print!("exact disk, integers:      {best:8.3} s, error {own:.1e}");
-    print!("{}", beyond.map_or(String::new(), |b| format!(", {b:.2} bytes a pixel")));
+    print!("{}", beyond.map_or(String::new(), |b| format!(", {b:.2} bytes per pixel")));
     println!("{}", processor.map_or(String::new(), |p| format!(", {p:.2} s of processor")));
 
     let start = Instant::now();
@@ -69,7 +69,7 @@ fn main() {
     println!("direct sum, from {rows} rows:  {seconds:8.1} s ({checksum:.3e})");
 }
 
-/// Mean and deviation of equation 7.1, with the mean taken off first.
+/// Mean and deviation of equation 7.1, with the mean subtracted first.
 fn direct(map: &Map, radius: usize, x: usize, y: usize) -> (f64, f64) {
     let (r, side) = (radius as i64, i64::from(map.width));
     let (mut sum, mut square, mut n) = (0.0, 0.0, 0.0);
@@ -89,8 +89,8 @@ fn direct(map: &Map, radius: usize, x: usize, y: usize) -> (f64, f64) {
     (mean + shift, (square / n - mean * mean).max(0.0).sqrt())
 }
 
-/// Deviation by one complex transform of values and squares, a product with that of the disk, and its inverse. What
-/// reaches over the border counts as 0, so it is only right `radius` texels from it.
+/// Deviation by one complex transform of values and squares, a product with that of the disk, and its inverse. Texels
+/// beyond the border count as 0, so the result is only right `radius` texels or more from it.
 fn by_transforms<T: FftNum + real::Real>(map: &Map, radius: usize) -> Vec<T> {
     let side = map.width as usize;
     let size = (side + 2 * radius).next_multiple_of(64);
@@ -123,7 +123,7 @@ fn by_transforms<T: FftNum + real::Real>(map: &Map, radius: usize) -> Vec<T> {
     transform(&mut image, size, &inverse);
     let norm = T::of(1.0 / (area as f64 * (size * size) as f64));
     let deviation = |i: usize| {
-        // The second transform left rows and columns exchanged twice: back in order.
+        // The second transform exchanged rows and columns again, so they are back in order.
         let c = image[i / side * size + i % side];
         let (mean, square) = (c.re * norm, c.im * norm);
         let variance = square - mean * mean;

@@ -1,6 +1,6 @@
 //! Bakes the skin colour look-up, prints how fast and how accurate it is, and writes it as a picture.
 //!
-//! `cargo run --release -p rubor-rig --example skin_color [PHOTONS [FILE.ppm]]`; with photons (a wavelength) it also
+//! `cargo run --release -p rubor-rig --example skin_color [PHOTONS [FILE.ppm]]`; with PHOTONS (per wavelength) it also
 //! compares with photon walks.
 
 use rubor_rig::color::{

@@ -8,9 +8,9 @@
 //!   1 + sum of weight (scale - 1), at least 0 ----------------------------> FaceState.hemoglobin_scale
 //! ```
 //!
-//! Limits: a weight is held in 0..1 where expressions, states, combinations and in-betweens add up. A track of a single
-//! shape passes as it was authored, also below 0 and above 1, as glTF allows: the limits of that shape reach as far as
-//! its track. Combinations see their drivers in 0..1; in-betweens continue their first and last segment.
+//! Limits: a weight is clamped to 0..1 where expressions, states, combinations and in-betweens add up. A track of a
+//! single shape is used as authored, also below 0 and above 1, as glTF allows: the limits of that shape are widened to
+//! its track. Combinations read their drivers clamped to 0..1; in-betweens extrapolate their first and last segment.
 //!
 //! Source: zones from papers/004 section 8.2 (negative weights, clamped sum), distributions from eq. 7.6 (weights sum to
 //! one with the neutral), global scale from section 7.7. Ours: how several distributions share when they ask for more
@@ -29,16 +29,16 @@ use crate::names::{self, Resolver, Target};
 /// Weights of everything that a rig can do, in the order of [`BoundRig`]'s names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weights {
-    /// One an expression, 0 to 2.
+    /// One per expression, 0 to 2.
     pub expressions: Vec<f32>,
-    /// One a state, 0 to 2.
+    /// One per state, 0 to 2.
     pub states: Vec<f32>,
-    /// One a shape of the head, added to what the expressions do. Any finite number: the sum is held in 0..1 only as
-    /// far as this weight itself lies there.
+    /// One per shape of the head, added to the effect of the expressions. Any finite number: the sum is clamped to 0..1
+    /// only as far as this weight itself lies there.
     pub shapes: Vec<f32>,
 }
 
-/// Range that the weight of a shape is held in: 0..1, and as far beyond as authored weights go.
+/// Range to which the weight of a shape is clamped: 0..1, widened to the authored weights.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     low: f32,
@@ -91,7 +91,7 @@ struct BoundCombination {
     mode: CombinationMode,
 }
 
-/// The way of one shape: in-between targets by rising weight, then the shape itself at 1.
+/// The path of one shape: in-between targets by rising weight, then the shape itself at 1.
 #[derive(Clone, Debug)]
 struct Inbetweens {
     shape: u32,
@@ -99,7 +99,7 @@ struct Inbetweens {
 }
 
 impl BoundRig {
-    /// Resolves a rig. What the head lacks is left out and noted.
+    /// Resolves a rig. Names that the head lacks are left out, each with a note.
     ///
     /// # Errors
     /// A rig that [`Rig::check`] refuses, or a shape name that neither rubor nor the head knows.
@@ -163,12 +163,12 @@ impl BoundRig {
         self.states.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Place of an expression in [`Weights::expressions`].
+    /// Index of an expression in [`Weights::expressions`].
     pub fn expression_index(&self, name: &str) -> Option<usize> {
         self.expression_names().position(|n| n == name)
     }
 
-    /// Place of a state in [`Weights::states`].
+    /// Index of a state in [`Weights::states`].
     pub fn state_index(&self, name: &str) -> Option<usize> {
         self.state_names().position(|n| n == name)
     }
@@ -252,10 +252,10 @@ fn add(sums: &mut [f32], effects: &[(u32, f32)], weight: f32) {
 }
 
 impl Inbetweens {
-    /// Shares the weight of a shape between the two stops around it. The rest shape stands at 0, the shape at 1; outside
-    /// the first and the last segment go on.
+    /// Shares the weight of a shape between the two stops around it. The rest shape stands at 0, the shape at 1; beyond
+    /// them the first and the last segment are extrapolated.
     fn distribute(&self, weight: f32, shapes: &mut [f32], limits: &mut [Limits]) {
-        // Takes away what the shape got as its own, so that a target which is also driven directly keeps that.
+        // Subtracts only this weight, so that a target which is also driven directly keeps its own.
         shapes[self.shape as usize] -= weight;
         let beyond = !(0.0..=1.0).contains(&weight);
         let mut give = |shape: u32, share: f32| {
@@ -276,7 +276,7 @@ impl Inbetweens {
     }
 }
 
-/// Resolves names and collects notes, each missing name once.
+/// Resolves names and collects one note per missing name.
 pub(crate) struct Binder<'a> {
     pub(crate) notes: Vec<Note>,
     source: &'a Source,
@@ -298,7 +298,7 @@ impl<'a> Binder<'a> {
         }
     }
 
-    /// Targets of a shape name. `at_key`: the name is the last key of the path, and not the value there.
+    /// Targets of a shape name. `at_key`: the name is the last key of the path, not the value at it.
     pub(crate) fn shape(&mut self, name: &str, at: &[Step], at_key: bool) -> Result<Vec<Target>, RigError> {
         let targets = self.shapes.resolve(name);
         if targets.is_empty() {
@@ -408,7 +408,7 @@ impl<'a> Binder<'a> {
                 continue;
             }
             let pairs: Vec<_> = shapes.iter().zip(&targets).collect();
-            // A half of a shape that the head has only undivided has no way of its own.
+            // Where the head has only the undivided shape, a half of it has no path of its own.
             let halves = pairs.iter().any(|(shape, target)| shape.factor != 1.0 || target.factor != 1.0);
             if shapes.len() != targets.len() || halves {
                 return Err(RigError {

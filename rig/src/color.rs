@@ -170,7 +170,7 @@ mod tests {
     fn ciede2000_reproduces_the_published_pairs() {
         for (i, (a, b, expected)) in PAIRS.iter().enumerate() {
             let found = [ciede2000(*a, *b), ciede2000(*b, *a)];
-            // Pair 14 has hues exactly opposite: which side of the jump it falls on is rounding.
+            // Pair 14 has hues exactly opposite: rounding decides on which side of the jump it falls.
             let on_jump = i == 13;
             for d in found {
                 let near = |e: f64| (d - e).abs() < 5.1e-5;

@@ -1,6 +1,6 @@
 //! Deformation: points, normals and tangents of a head under blend shape weights.
 //!
-//! The truth that the GPU kernels are compared with. Normals and tangents are recomputed from the deformed
+//! The reference for the GPU kernels. Normals and tangents are recomputed from the deformed
 //! triangles rather than blended, so they are right for any weights.
 
 use glam::{Vec2, Vec3, Vec4};
@@ -9,7 +9,7 @@ use crate::head::{BlendShape, Mesh};
 
 /// Deformed points, metres: rest plus the weighted offsets of every shape.
 ///
-/// `weights` has one value a shape; missing ones count as zero.
+/// `weights` has one value per shape; missing ones count as zero.
 pub fn deform_points(mesh: &Mesh, shapes: &[BlendShape], weights: &[f32]) -> Vec<Vec3> {
     let mut points = mesh.points.clone();
     for (shape, weight) in shapes.iter().zip(weights) {

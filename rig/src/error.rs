@@ -6,23 +6,23 @@
 pub struct HeadError {
     /// Name of the head.
     pub head: String,
-    /// Place inside it.
+    /// Place inside the head.
     pub at: String,
-    /// What stands there.
+    /// The value there.
     pub found: String,
-    /// What should.
+    /// The values that are allowed.
     pub expected: &'static str,
 }
 
-/// A medium, profile, fit or kernel that is not defined for what it was given.
+/// A medium, profile, fit or kernel that is not defined for its input.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{at}: found {found}, expected {expected}")]
 pub struct SkinError {
     /// Which number of which value, for example `medium.sigma_a_per_mm`.
     pub at: String,
-    /// What was given.
+    /// The value that was given.
     pub found: String,
-    /// What would do.
+    /// The values that are allowed.
     pub expected: &'static str,
 }
 
@@ -36,24 +36,24 @@ impl SkinError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}found {found}, expected {expected}{}", did_you_mean(.nearest.as_deref()))]
 pub struct RigError {
-    /// Where.
+    /// Where it is.
     pub place: Place,
-    /// What stands there.
+    /// The text or value there.
     pub found: String,
-    /// What should.
+    /// What is allowed there.
     pub expected: String,
     /// The valid name that is most like the one found.
     pub nearest: Option<String>,
 }
 
-/// Something in a rig or sequence that has no effect on this head, or not the expected one. Work goes on.
+/// A warning: something in a rig or sequence has no effect on this head, or not the expected one.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Note {
     /// Where it is written.
     pub place: Place,
     /// What has no effect, and why.
     pub message: String,
-    /// The name in the message: notes that differ in nothing else are of one kind.
+    /// The name in the message. Notes that differ only in the name are of one kind.
     pub subject: Option<String>,
     /// The valid name that is most like the one found.
     pub nearest: Option<String>,
@@ -69,10 +69,10 @@ impl Note {
     }
 }
 
-/// Most names in a message.
+/// Largest number of names in a message.
 const NAMES_SHOWN: usize = 8;
 
-/// Notes of one kind as one, in the order of the first of each: where that one is written, with the names of all.
+/// Merges the notes of one kind: each result has the place of the first note and the names of all.
 pub fn summed(notes: &[Note]) -> Vec<Note> {
     let mut kinds: Vec<(String, Vec<&Note>)> = Vec::new();
     let mut place_of: std::collections::HashMap<String, usize> = std::collections::HashMap::new();
@@ -111,7 +111,7 @@ impl std::fmt::Display for Note {
 /// A place in a file. Printed as `file:line:column: `, ready to stand before a message.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Place {
-    /// As the user named it; empty for what was made by a program.
+    /// As the user named it; empty for a value that a program made.
     pub file: String,
     /// From 1; 0 where the file as a whole is meant.
     pub line: usize,

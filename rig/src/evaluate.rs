@@ -57,14 +57,14 @@ pub struct CameraState {
 pub struct LightState {
     /// As in the sequence; may be empty.
     pub name: String,
-    /// What it is.
+    /// Kind of the light.
     pub kind: LightKind,
     /// Colour times intensity, linear Rec. 709. Directional: irradiance on a surface that faces it.
     /// Point and spot: radiant intensity, so irradiance times square metre.
     pub power_linear: Vec3,
     /// Metres; zero for a directional light.
     pub position: Vec3,
-    /// In which the light travels, unit length; zero for a point light.
+    /// Direction in which the light travels, unit length; zero for a point light.
     pub direction: Vec3,
     /// Half angles of a spot's cone, radians: fully lit up to the first, dark from the second.
     pub cone_half_angles: [f32; 2],
@@ -92,7 +92,7 @@ pub struct Evaluator {
     expressions: Vec<(usize, Track<f32>)>,
     states: Vec<(usize, Track<f32>)>,
     shapes: Vec<(Vec<Target>, Track<f32>)>,
-    /// What gaze, blinks and breath move, in the order of [`LIVING_SHAPES`].
+    /// Indices of the shapes that gaze, blinks and breath move, in the order of [`LIVING_SHAPES`].
     living: Vec<Vec<Target>>,
 }
 
@@ -111,11 +111,11 @@ const LIVING_SHAPES: [&str; 12] = [
     "noseSneerLeft",
     "noseSneerRight",
 ];
-/// Turn of an eye by `eyeLook*` at weight 1, degrees: about what heads for ARKit are made with.
+/// Rotation of an eye at `eyeLook*` weight 1, degrees: the usual value of heads made for ARKit.
 const LOOK_DEGREES: f32 = 30.0;
 
 impl Evaluator {
-    /// Resolves all names once. Notes tell what has no effect on this head.
+    /// Resolves all names once. Notes name the entries that have no effect on this head.
     ///
     /// # Errors
     /// What [`Rig::check`] and [`Sequence::check`] refuse; an expression or state that the rig does not have; a shape
@@ -158,7 +158,7 @@ impl Evaluator {
         notes.append(&mut binder.notes);
         let mut living = Vec::new();
         if sequence.eyes.is_some() || sequence.life.is_some() {
-            // What a head has no shape for stays still; that is no fault of the sequence, so notes go unsaid.
+            // A head without these shapes keeps still. The sequence is not at fault, so there is no note.
             let mut binder = Binder::new(head, source);
             for name in LIVING_SHAPES {
                 living.push(binder.shape(name, &[], true)?);
@@ -242,7 +242,7 @@ impl Evaluator {
         for (index, track) in &self.states {
             weights.states[*index] = track.at(time_s);
         }
-        // Tracks pass as they are; where several add up they are held as far as the furthest of them goes.
+        // A single track is used unclamped; a sum of tracks is clamped to the widest range among them.
         let mut limits = vec![Limits::default(); weights.shapes.len()];
         for (targets, track) in &self.shapes {
             let weight = track.at(time_s);
@@ -298,7 +298,7 @@ impl Evaluator {
             state.position = self.frame.origin + Vec3::from(position.at(time_s));
         }
         let away = state.position - state.target;
-        // A camera in its own target looks at the face from in front.
+        // A camera at its own target has no view direction: it looks at the face from the front.
         let away = if away.length() > 1e-6 { away } else { Vec3::Z * 1e-3 };
         let orbit = camera.orbit_degrees.at(time_s).to_radians();
         let elevation = camera.elevation_degrees.at(time_s).to_radians();
@@ -322,7 +322,7 @@ impl Evaluator {
                 };
                 let direction = match (&light.direction, light.kind) {
                     (_, LightKind::Point) => Vec3::ZERO,
-                    // Two opposite keys meet in no direction halfway: then the light comes from in front.
+                    // Two opposite keys have no direction halfway: then the light comes from the front.
                     (Some(track), _) => Vec3::from(track.at(time_s)).normalize_or(Vec3::NEG_Z),
                     (None, _) => (origin - position).normalize_or(Vec3::NEG_Z),
                 };

@@ -44,7 +44,7 @@ pub struct Rig {
     /// Shapes that a shape passes through on its way to full weight.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inbetweens: Vec<Inbetween>,
-    /// Where it was read from.
+    /// The text that it was read from.
     #[serde(skip)]
     pub source: Source,
 }
@@ -104,19 +104,19 @@ pub struct Combination {
     pub shape: String,
     /// The shapes that drive it. Both halves of a pair are two drivers; write `eyeBlinkLeft`, not `eyeBlink`, for one.
     pub drivers: Vec<String>,
-    /// How the drivers' weights become one.
+    /// How the weights of the drivers are combined.
     #[serde(default)]
     pub mode: CombinationMode,
 }
 
-/// How the weights of drivers become one.
+/// How the weights of drivers are combined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub enum CombinationMode {
-    /// All multiplied: smooth, weak until all drivers are strong.
+    /// The product: smooth, weak until all drivers are strong.
     #[default]
     Product,
-    /// The smallest: linear while the drivers rise together.
+    /// The minimum: linear while the drivers rise together.
     Min,
 }
 
@@ -167,7 +167,7 @@ impl Rig {
     /// Reads and checks a rig. `file` is the name that messages give it.
     ///
     /// # Errors
-    /// The first thing that is wrong whatever head will be used, with its place.
+    /// The first fault that does not depend on the head, with its place.
     pub fn from_json(file: &str, text: &str) -> Result<Self, RigError> {
         let (mut rig, source) = json::from_str::<Self>(file, text)?;
         rig.source = source;
@@ -261,7 +261,7 @@ impl Rig {
         weights: &BTreeMap<String, f32>,
         scale: f32,
     ) -> Result<(), RigError> {
-        // Decimal fractions such as 0.7 + 0.2 + 0.1 pass one by rounding only.
+        // Decimal fractions such as 0.7 + 0.2 + 0.1 may exceed 1 by rounding only.
         const ROUNDING: f32 = 1e-5;
         for (name, weight) in weights {
             if !(weight.is_finite() && *weight >= 0.0) {

@@ -1,14 +1,14 @@
-//! The state of a face at one moment: all that the renderer needs beside the head itself.
+//! The state of a face at one moment: everything that the renderer needs besides the head itself.
 
 use glam::{Quat, Vec3};
 
 use crate::head::Head;
 use crate::life::CALM_PUPIL_MM;
 
-/// Weights of one moment, resolved against one head. Names are gone: everything is an index into the head.
+/// Weights of one moment, resolved against one head. Everything is an index into the head; there are no names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaceState {
-    /// Weight of each of [`Head::shapes`], combinations and in-betweens included. 0 to 1, and beyond where a
+    /// Weight of each of [`Head::shapes`], combinations and in-betweens included. 0 to 1, and beyond where the
     /// track of a single shape goes there.
     pub shapes: Vec<f32>,
     /// Weight of each of `maps.zones`, 0 to 1: already summed over expressions and clamped (papers/004 section 8.2).

@@ -15,7 +15,7 @@ pub struct FaceFrame {
     pub head_height: f32,
 }
 
-/// Vertical field of view of a framing, radians (22 degrees): as a portrait lens, so that noses stay small.
+/// Vertical field of view of a framing, radians (22 degrees): that of a portrait lens, which does not enlarge the nose.
 const PORTRAIT_FOV_Y: f32 = 0.384;
 /// A picture is at least this wide in units of the framing's height; a narrower one is taken from further away.
 const LEAST_ASPECT: f32 = 0.8;
@@ -23,7 +23,7 @@ const LEAST_ASPECT: f32 = 0.8;
 impl FaceFrame {
     /// From landmarks where the head has them, else from its bounds by the proportions of a human head.
     pub fn of(head: &Head) -> Self {
-        // Top of head to chin of a tall adult, metres. Below it a head's mesh has a neck and shoulders.
+        // From the top of the head to the chin of a tall adult, metres. Whatever is lower is neck and shoulders.
         const TALLEST_HEAD: f32 = 0.24;
         let landmark = |name: &str| head.landmarks.get(name).copied();
         let (low, high) = head.bounds().unwrap_or((Vec3::splat(-0.12), Vec3::splat(0.12)));
@@ -42,8 +42,8 @@ impl FaceFrame {
         Self { origin, head_height: head_height.max(1e-3) }
     }
 
-    /// The camera of a framing: straight in front. `fov_y` in radians replaces the portrait lens and keeps the size of
-    /// the face by moving the camera; `aspect` is width over height of the picture.
+    /// The camera of a framing: straight in front of the face. `fov_y` in radians replaces the portrait lens and keeps
+    /// the size of the face by moving the camera; `aspect` is width over height of the picture.
     pub fn camera(&self, framing: Framing, fov_y: Option<f32>, aspect: f32) -> CameraState {
         // Height of the picture at the eyes' depth and how far its middle lies below the eyes, in head heights.
         // Judged on pictures of the default head.

@@ -28,7 +28,7 @@ pub struct Head {
     pub maps: SkinMaps,
     /// Anatomical points of the rest surface by name (see [`crate::landmarks`]), metres.
     pub landmarks: BTreeMap<String, Vec3>,
-    /// Where geometry and maps come from.
+    /// Sources of geometry and maps.
     pub provenance: Vec<Provenance>,
 }
 
@@ -66,7 +66,7 @@ pub struct Vertex {
 pub struct Part {
     /// Name in the source file, for messages.
     pub name: String,
-    /// How it is shaded.
+    /// Material that it is shaded with.
     pub material: Material,
     /// Range of [`Mesh::triangles`].
     pub triangles: Range<u32>,
@@ -97,7 +97,7 @@ pub enum Material {
     Wet,
     /// Helper shells that darken or blend the eye in other renderers; never drawn here.
     Hidden,
-    /// Anything else: drawn diffuse grey.
+    /// Anything else: drawn in diffuse grey.
     Other,
 }
 
@@ -116,7 +116,7 @@ impl Material {
         Material::Other,
     ];
 
-    /// Its place in [`Material::ALL`]: the number that shaders know it by.
+    /// Its index in [`Material::ALL`], which shaders use.
     pub fn number(self) -> u32 {
         Self::ALL.iter().position(|m| *m == self).unwrap_or(0) as u32
     }
@@ -142,8 +142,8 @@ pub struct BlendShape {
     pub points: Vec<u32>,
     /// Displacement at weight 1 of each of them, metres.
     pub offsets: Vec<Vec3>,
-    /// How [`Mesh::occlusion`] changes, also of points that do not move; points strictly increasing. Empty where the shape
-    /// changes nothing or nobody measured it.
+    /// Changes of [`Mesh::occlusion`], also of points that do not move; points strictly increasing. Empty where the
+    /// shape changes nothing or the changes were not measured.
     pub occlusion: Vec<OcclusionChange>,
 }
 
@@ -159,14 +159,14 @@ pub struct OcclusionChange {
 }
 
 impl OcclusionChange {
-    /// Change at a weight, which counts as 0 to 1: the parabola through rest and both values.
+    /// Change at a weight, which is clamped to 0 to 1: the parabola through rest and both values.
     pub fn at(&self, weight: f32) -> f32 {
         let w = weight.clamp(0.0, 1.0);
         4.0 * w * (1.0 - w) * self.at_half + w * (2.0 * w - 1.0) * self.at_full
     }
 }
 
-/// The maps of a head, all in its texture space. Each is optional: what is missing is not drawn.
+/// The maps of a head, all in its texture space. Each is optional; a missing map has no effect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SkinMaps {
     /// Melanin volume fraction of the epidermis, 0 to 0.5 (papers/004 table 7.1), 1 channel.
@@ -216,10 +216,10 @@ pub struct WrinkleZone {
     pub mask: Map,
 }
 
-/// Where something comes from and how far it can be trusted.
+/// The source of something and how reliable it is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
-    /// What it speaks of: `geometry`, `shapes`, `maps.melanin`, ...
+    /// What it describes: `geometry`, `shapes`, `maps.melanin`, ...
     pub of: String,
     /// `measured`, `painted`, `synthesised` or `predicted`.
     pub kind: ProvenanceKind,
@@ -261,7 +261,7 @@ impl Head {
         self.shapes.iter().position(|s| s.name == name)
     }
 
-    /// Checks everything that the rest of rubor takes for granted: indices in range, finite numbers,
+    /// Checks everything that the rest of rubor relies on: indices in range, finite numbers,
     /// parts that cover the triangles, map channels.
     ///
     /// # Errors
@@ -277,7 +277,7 @@ impl Head {
             }
         }
         if !mesh.occlusion.is_empty() && mesh.occlusion.len() != mesh.points.len() {
-            return fail("occlusion".into(), mesh.occlusion.len().to_string(), "one value a point");
+            return fail("occlusion".into(), mesh.occlusion.len().to_string(), "one value per point");
         }
         for (i, v) in mesh.vertices.iter().enumerate() {
             if v.point as usize >= mesh.points.len() {
@@ -309,7 +309,7 @@ impl Head {
         for shape in &self.shapes {
             let at = || format!("shape {}", shape.name);
             if shape.points.len() != shape.offsets.len() {
-                return fail(at(), format!("{} offsets", shape.offsets.len()), "one offset a moved point");
+                return fail(at(), format!("{} offsets", shape.offsets.len()), "one offset per moved point");
             }
             if shape.points.windows(2).any(|w| w[0] >= w[1]) {
                 return fail(at(), "unsorted points".into(), "strictly increasing points");

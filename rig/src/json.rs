@@ -1,4 +1,4 @@
-//! Reading JSON as people write it, with the place of everything that is wrong.
+//! Reading JSON as people write it, with the place of every fault.
 //!
 //! ```text
 //! text --parse--> tree with ranges --serde--> Rig, Sequence  (+ Source: text and file name)
@@ -9,7 +9,7 @@
 //! Allowed beyond JSON: `//` and `/* */` comments, trailing commas. Not allowed, unlike in some readers: the same key
 //! twice, as the first would be silently lost.
 //!
-//! Ranges are checked where values are bound, not by a derive (`garde`): those know no place in the text.
+//! Ranges are checked where values are bound, not by a derive (`garde`), which has no place in the text.
 
 use std::fmt::Display;
 use std::sync::Arc;
@@ -25,8 +25,8 @@ use serde::forward_to_deserialize_any;
 use crate::error::{Place, RigError};
 use crate::names::nearest;
 
-/// Where a value was read from, kept with it so that a later message can name the place.
-/// All sources are equal to each other: two rigs are the same rig whatever file they stand in.
+/// Where a value was read from, kept with the value so that later messages can name the place.
+/// All sources are equal to each other: two equal rigs from different files are equal.
 #[derive(Clone, Debug, Default)]
 pub struct Source {
     file: Arc<str>,
@@ -39,7 +39,7 @@ impl PartialEq for Source {
     }
 }
 
-/// One step from a JSON value into it.
+/// One step from a JSON value to a value inside it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
     /// The member of an object.
@@ -83,7 +83,7 @@ impl Source {
         &self.file
     }
 
-    /// Place of a value, or of the last value on the way that exists.
+    /// Place of a value, or of the last value on the path that exists.
     pub fn place_of_value(&self, path: &[Step]) -> Place {
         self.place(path, false)
     }
@@ -121,9 +121,9 @@ impl Source {
 /// Reads a value.
 ///
 /// # Errors
-/// Syntax, unknown fields, wrong types: the first of them with its place.
+/// The first syntax error, unknown field or wrong type, with its place.
 pub fn from_str<T: DeserializeOwned>(file: &str, text: &str) -> Result<(T, Source), RigError> {
-    // A byte order mark is no part of the text for the one who wrote it.
+    // Columns are counted without the byte order mark, which editors do not show.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let root = match parse(text) {
         Ok(Some(root)) => root,
@@ -222,7 +222,8 @@ fn syntax_error(file: &str, text: &str, error: &jsonc_parser::errors::ParseError
     RigError {
         place: place_of_offset(file, text, range.start),
         found: match error.kind() {
-            // Their place is the beginning, which is easier to find the mistake from than the end of the file.
+            // Their place is the opening bracket: the mistake is easier to find from there than from the end of the
+            // file.
             Kind::UnterminatedArray | Kind::UnterminatedObject => {
                 "an opening bracket without its end".to_owned()
             }
@@ -233,7 +234,7 @@ fn syntax_error(file: &str, text: &str, error: &jsonc_parser::errors::ParseError
     }
 }
 
-/// The beginning of what stands at an offset, for a message.
+/// The beginning of the text at an offset, for a message.
 fn excerpt(text: &str, offset: usize) -> String {
     const LONGEST: usize = 24;
     let rest = text.get(offset..).unwrap_or_default();
@@ -249,7 +250,7 @@ fn excerpt(text: &str, offset: usize) -> String {
     }
 }
 
-/// What serde finds wrong, before it has a file and a line.
+/// A fault that serde found, before the file and the line are known.
 #[derive(Debug)]
 struct NodeError {
     offset: Option<usize>,
@@ -263,7 +264,7 @@ impl NodeError {
         Self { offset: None, found, expected, nearest: None }
     }
 
-    /// The innermost value gives the place; an error that has one keeps it.
+    /// The innermost value gives the place: an error that already has a place keeps it.
     fn at(mut self, node: &Value<'_>) -> Self {
         if self.offset.is_none() {
             self.offset = Some(node.range().start);
@@ -298,7 +299,7 @@ impl Display for NodeError {
 
 impl std::error::Error for NodeError {}
 
-/// Rust's words for types in those of the one who writes JSON.
+/// Names of Rust's types in JSON's terms.
 fn in_json_words(expected: &dyn de::Expected) -> String {
     match expected.to_string().as_str() {
         "f32" | "f64" => "a number".to_owned(),

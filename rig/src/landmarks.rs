@@ -1,4 +1,4 @@
-//! Names of anatomical points that maps and cameras are placed by.
+//! Names of anatomical points by which maps and cameras are placed.
 //!
 //! `left` and `right` are the character's; left is +X. A head need not have all of them.
 //! Names follow anthropometry where it has one (exocanthion = outer corner of the eye, alare = wing of the nose,

@@ -6,7 +6,7 @@
 //! sequence.json --> timeline::Sequence ----------------------------+--> evaluate::Evaluator
 //!   (json: every error with file, line, column)                               | at(time)
 //!                                                                             v
-//! Head (points) --> deform (CPU truth of the kernels) <-- FaceState <-- evaluate::Shot --> renderer, export
+//! Head (points) --> deform (CPU reference of the kernels) <-- FaceState <-- evaluate::Shot --> renderer, export
 //! ```
 //!
 //! Pure CPU: no GPU, no file formats beyond serde.

@@ -1,13 +1,14 @@
-//! What nobody keys: where the eyes look, how wide the pupils are, and the small motions of someone alive.
+//! Gaze, pupils and the small involuntary motions of a living person, which are not keyed.
 //!
 //! ```text
 //! time, seed --cells of time, one event each--> blinks, saccades --+
-//! time, seed --sines of unlike periods--> breath, sway ------------+--> Motion, added to the tracks
+//! time, seed --sines of different periods--> breath, sway ------------+--> Motion, added to the tracks
 //! ```
 //!
-//! Every value is a function of the time and the seed: no frame depends on another, and a frame rate changes nothing but
-//! which moments are seen. Figures are those of people at rest: 12 to 20 blinks a minute of about 0.25 s (Stern et al.
-//! 1984), fixations of 0.2 to 2 s with jumps of 0.03 s between them (Leigh and Zee 2015), 12 to 16 breaths a minute.
+//! Every value is a function of the time and the seed: no frame depends on another, and the frame rate changes only
+//! which moments are sampled. The figures are those of people at rest: 12 to 20 blinks per minute of about 0.25 s
+//! (Stern et al. 1984), fixations of 0.2 to 2 s with jumps of 0.03 s between them (Leigh and Zee 2015), 12 to 16
+//! breaths per minute.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -43,14 +44,14 @@ impl Default for Eyes {
     }
 }
 
-/// Small motions; each is off at 0, that of a calm person at 1.
+/// Small motions; each is off at 0 and that of a calm person at 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct Life {
-    /// Another seed, other moments.
+    /// Seed of the random numbers; another seed gives other moments.
     #[serde(default)]
     pub seed: u32,
-    /// How often the eyes blink: 1 is 15 times a minute, 4 the most.
+    /// How often the eyes blink: 1 is 15 times per minute, 4 is the largest value.
     #[serde(default)]
     #[schemars(range(min = 0, max = 4))]
     pub blinks: f32,
@@ -60,7 +61,7 @@ pub struct Life {
     /// How deep the breath is: 1 lifts the head by a millimetre and a half.
     #[serde(default)]
     pub breathing: Track<f32>,
-    /// Breaths a minute.
+    /// Breaths per minute.
     #[serde(default = "calm_breath")]
     #[schemars(range(min = 4, max = 60))]
     pub breaths_per_minute: f32,
@@ -86,16 +87,16 @@ impl Default for Life {
     }
 }
 
-/// What life adds at a moment.
+/// The motion that life adds at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
     /// Weight of the blink of the left and of the right eye.
     pub blink: [f32; 2],
-    /// Of the gaze: yaw and pitch, degrees, as in [`Eyes`].
+    /// Rotation of the gaze: yaw and pitch, degrees, as in [`Eyes`].
     pub gaze_degrees: [f32; 2],
-    /// Of the head: yaw, pitch and roll, degrees.
+    /// Rotation of the head: yaw, pitch and roll, degrees.
     pub head_degrees: [f32; 3],
-    /// Of the head, metres.
+    /// Translation of the head, metres.
     pub translation: [f32; 3],
     /// Weight of flared nostrils: breath in.
     pub nostrils: f32,
@@ -103,7 +104,7 @@ pub struct Motion {
 
 /// Seconds between two blinks at a rate of 1.
 const BLINK_EVERY_S: f64 = 4.0;
-/// Seconds to close, to stay shut, to open.
+/// Durations of closing, staying shut and opening, seconds.
 const BLINK_S: [f64; 3] = [0.085, 0.045, 0.16];
 /// The right lid follows the left by this, seconds.
 const LAG_S: f64 = 0.008;
@@ -111,7 +112,7 @@ const LAG_S: f64 = 0.008;
 const FIXATION_S: f64 = 0.85;
 const JUMP_S: f64 = 0.035;
 
-/// A number from 0 to 1 for the cell of time `cell` of a purpose.
+/// A random number from 0 to 1 for one purpose in the cell of time `cell`.
 fn random(seed: u32, purpose: u32, cell: i64) -> f64 {
     let z = (u64::from(seed) << 32 | u64::from(purpose)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
         ^ (cell as u64).wrapping_mul(0xd1b5_4a32_d192_ed03);
@@ -123,18 +124,18 @@ fn smooth(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
-/// How far a lid is shut at a time after its blink began.
+/// How far a lid is shut, at a time since its blink began.
 fn shut(since_s: f64) -> f64 {
     let [close, hold, open] = BLINK_S;
     if since_s < close { smooth(since_s / close) } else { 1.0 - smooth((since_s - close - hold) / open) }
 }
 
-/// Moment of the event of a cell, in cells: somewhere in its middle four fifths.
+/// Time of the event of a cell, in units of a cell: within its middle four fifths.
 fn moment(seed: u32, purpose: u32, cell: i64) -> f64 {
     cell as f64 + 0.1 + 0.8 * random(seed, purpose, cell)
 }
 
-/// Sines of unlike periods: smooth, from about -1 to 1, without a beat that the eye would find.
+/// A sum of sines of different periods: smooth, from about -1 to 1, without a visible repetition.
 fn wander(seed: u32, purpose: u32, time_s: f64) -> f64 {
     [(5.3, 0.5), (3.1, 0.3), (1.7, 0.2)]
         .iter()
@@ -147,7 +148,7 @@ fn wander(seed: u32, purpose: u32, time_s: f64) -> f64 {
 }
 
 impl Life {
-    /// What it adds at a time in seconds.
+    /// The motion that it adds at a time in seconds.
     pub fn at(&self, time_s: f64) -> Motion {
         let mut motion = Motion::default();
         if self.blinks > 0.0 {
@@ -169,7 +170,7 @@ impl Life {
             let last = if moment(self.seed, 2, now) * FIXATION_S <= time_s { now } else { now - 1 };
             let share = smooth((time_s - moment(self.seed, 2, last) * FIXATION_S) / JUMP_S);
             for (axis, reach) in [1.6, 1.0].into_iter().enumerate() {
-                // The mean of two even numbers: mostly small jumps, rarely the largest.
+                // The mean of two uniform numbers: small jumps are frequent, the largest are rare.
                 let target = |cell: i64| {
                     let [a, b] = [3, 4].map(|k| random(self.seed, k + 2 * axis as u32, cell));
                     2.0 * reach * (a + b - 1.0)

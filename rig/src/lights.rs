@@ -1,7 +1,7 @@
 //! Light rigs by name: lights and surroundings that can replace those of any sequence.
 //!
-//! A rig is written as a sequence of which only `lights` and `environment` are taken, so a user's own sequence file can
-//! serve as one.
+//! A rig is written as a sequence of which only `lights` and `environment` are used, so any sequence file can serve as
+//! a light rig.
 
 use crate::error::RigError;
 use crate::timeline::Sequence;
@@ -16,7 +16,7 @@ pub const LIGHT_RIGS: [(&str, &str); 6] = [
     ("sky", include_str!("lights/sky.json")),
 ];
 
-/// The built-in rig of a name; `None` if there is none.
+/// The built-in rig of this name; `None` if there is none.
 ///
 /// # Errors
 /// None that a user can cause: the texts are part of the program and a test reads them.

@@ -5,11 +5,11 @@
 /// Texel (x, y) covers [x, x+1) / width by [y, y+1) / height in texture space; its value stands at its centre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// Texels in a row, at least 1.
+    /// Texels per row, at least 1.
     pub width: u32,
     /// Rows, at least 1.
     pub height: u32,
-    /// Values in a texel.
+    /// Values per texel.
     pub channels: u32,
     /// `width * height * channels` values.
     pub values: Vec<f32>,
@@ -45,7 +45,7 @@ impl Map {
         top * (1.0 - fy) + bottom * fy
     }
 
-    /// Shape and finiteness; the error is (place, found, expected).
+    /// Checks sizes and that all values are finite; the error is (place, found, expected).
     pub(crate) fn check(&self, name: &str, channels: u32) -> Result<(), (String, String, &'static str)> {
         let size = self.width as usize * self.height as usize * self.channels as usize;
         if self.channels != channels || size == 0 || self.values.len() != size {

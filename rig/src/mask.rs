@@ -1,4 +1,4 @@
-//! Which texels of a map carry data, and what follows from it: averages and filling that never mix in the rest.
+//! Which texels of a map carry data, with averages and hole filling that use only those.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use crate::map::Map;
 /// The mapped texels of a map: those that a surface uses or a camera saw.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
-    /// Texels in a row.
+    /// Texels per row.
     pub width: u32,
     /// Rows.
     pub height: u32,
@@ -41,7 +41,7 @@ impl Mask {
     /// Texels mapped in both; the sizes must agree.
     ///
     /// # Panics
-    /// When they do not.
+    /// The sizes differ.
     pub fn and(&self, other: &Mask) -> Mask {
         assert_eq!((self.width, self.height), (other.width, other.height), "masks of one size");
         let mapped = self.mapped.iter().zip(&other.mapped).map(|(a, b)| *a && *b).collect();

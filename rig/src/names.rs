@@ -1,4 +1,4 @@
-//! Names of blend shapes, zones and distributions: what a rigger writes against what a head has.
+//! Names of blend shapes, zones and distributions: matches the names that a rigger writes to those of a head.
 //!
 //! ```text
 //! "EyeBlink_L"  \
@@ -6,7 +6,7 @@
 //! "eye blink l" /
 //! ```
 //!
-//! ARKit's names are canonical. Letter case, spaces, dashes, underscores and the way a side is written do not count.
+//! ARKit's names are canonical. Letter case, spaces, dashes, underscores and the spelling of a side are ignored.
 //! ICT FaceKit splits `browInnerUp` and `cheekPuff` into halves: one written name may drive two shapes of a head,
 //! and two written halves share the one shape of a head that has no halves.
 
@@ -84,10 +84,11 @@ pub const ICT_EXTRA: [&str; 8] = [
 ];
 
 /// Action units of the Facial Action Coding System (P. Ekman, W. V. Friesen and J. C. Hager 2002) that a shape shows,
-/// the main one first; `L` and `R` mark the side where the shape has one. Empty for shapes that FACS has no unit for
+/// the main one first; `L` and `R` mark the side where the shape has one. Empty for shapes without a unit in FACS
 /// and for unknown names. FACS codes gaze as 61 to 64 and the jaw as action descriptors (AD).
 ///
-/// The match is one of appearance: no ARKit shape was defined by a unit. A shape that mixes units lists all of them.
+/// Shapes and units are matched by appearance: no ARKit shape was defined by a unit. A shape that mixes units lists all
+/// of them.
 ///
 /// ```
 /// use rubor_rig::names::action_units;
@@ -157,7 +158,7 @@ const ACTION_UNITS: [(&str, &[&str]); 58] = [
     ("noseSneerLeft", &["AU9L"]),
     ("noseSneerRight", &["AU9R"]),
     ("tongueOut", &["AD19"]),
-    // FACS has no unit for a mouth that moves to one side as a whole; what shows it is a one-sided stretch of the lips.
+    // FACS has no unit for a mouth that moves to one side as a whole; a one-sided stretch of the lips looks the same.
     ("mouthLeft", &[]),
     ("mouthRight", &[]),
 ];
@@ -234,7 +235,7 @@ pub enum Side {
     Right,
 }
 
-/// A name without its spelling.
+/// A name, independent of its spelling.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key {
     /// Lower case letters and digits of the name without its side.
@@ -281,7 +282,8 @@ impl Key {
         Self { base: self.base.clone(), side }
     }
 
-    /// `jawLeft` and `jawRight` move the whole jaw and are no halves of a `jaw`; the same holds for the mouth.
+    /// `jawLeft` and `jawRight` move the whole jaw, so they are not halves of a shape `jaw`; the same holds for the
+    /// mouth.
     fn has_halves(&self) -> bool {
         self.base != "jaw" && self.base != "mouth"
     }
@@ -324,12 +326,12 @@ pub fn is_known_shape(written: &str) -> bool {
     key.side.is_none() && key.has_halves() && vocabulary().map(Key::new).any(|k| k.base == key.base)
 }
 
-/// One thing of a head that a written name drives.
+/// A shape, zone or distribution of a head that a written name drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     /// Index into the list that the [`Resolver`] was made from.
     pub index: u32,
-    /// Share of the written weight that it gets: 1, or 1/2 where two written halves meet in one shape.
+    /// Factor on the written weight: 1, or 1/2 where two written halves drive one shape.
     pub factor: f32,
 }
 
@@ -341,7 +343,7 @@ pub struct Resolver {
 }
 
 impl Resolver {
-    /// For any list of names; indices of targets are places in it.
+    /// For any list of names; targets are indices into it.
     pub fn new<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
         let keys = names.iter().map(|n| Key::new(canonical(n).unwrap_or(n))).collect();
@@ -363,7 +365,7 @@ impl Resolver {
         Self::new(head.maps.distributions.iter().map(|d| d.name.as_str()))
     }
 
-    /// What a written name drives; empty if the head has nothing of that name. In this order:
+    /// The targets of a written name; empty if the head has none. Matches are tried in this order:
     /// 1. the exact name,
     /// 2. the same name in another spelling,
     /// 3. both halves, for a name without a side (`browInnerUp` on a head with `browInnerUp_L` and `_R`),
@@ -388,7 +390,7 @@ impl Resolver {
             let index = self.keys.iter().position(|k| *k == key)?;
             Some(Target { index: index as u32, factor: *share })
         };
-        // The first is the closer one: `blink` only where there is no `blinkLeft`.
+        // The first match is the closer one: `blink` is used only where there is no `blinkLeft`.
         presets.filter_map(whole).take(1).collect()
     }
 
@@ -429,7 +431,7 @@ impl Resolver {
     }
 }
 
-/// The candidate that is most like `written` without regard to letter case; `None` if none is like it at all.
+/// The candidate that is most like `written` without regard to letter case; `None` if none is similar.
 ///
 /// ```
 /// let emotions = ["joy", "anger", "sadness"];
@@ -437,7 +439,7 @@ impl Resolver {
 /// assert_eq!(rubor_rig::names::nearest("q", emotions), None);
 /// ```
 pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    // Below this Jaro-Winkler similarity a guess helps nobody; judged on misspelt ARKit names.
+    // Below this Jaro-Winkler similarity a guess does not help; tuned on misspelt ARKit names.
     const LEAST_SIMILARITY: f64 = 0.72;
     let lower = written.to_lowercase();
     let mut best: Option<(f64, &str)> = None;
@@ -447,7 +449,7 @@ pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>)
         if winkler < LEAST_SIMILARITY {
             continue;
         }
-        // Winkler's bonus for a common start alone would prefer a short name to a long one with a slip in it.
+        // Winkler's bonus for a common start alone would prefer a short name to a long misspelt one.
         let similarity = winkler + strsim::normalized_damerau_levenshtein(&lower, &other);
         if best.is_none_or(|(most, _)| similarity > most) {
             best = Some((similarity, candidate));

@@ -1,6 +1,6 @@
 //! The one generator whose sequences are part of results: kept photon walks, blinks of a face, skin colours.
 //!
-//! Ours and not a crate's, because kept results and goldens hold these very numbers and no crate promises its sequence
+//! Not taken from a crate: stored results and goldens depend on these very numbers, and no crate promises its sequence
 //! across versions.
 
 /// Counter through a finaliser (SplitMix64; Steele, Lea and Flood 2014).

@@ -1,9 +1,9 @@
-//! Surface strain of blend shapes, and what it says about blood and wrinkles where nobody measured them.
+//! Surface strain of blend shapes, and a prediction of blood and wrinkles where there are no measurements.
 //!
 //! A triangle's deformation gradient F maps its rest plane to the deformed one; C = F^T F has the squared principal
 //! stretches. Skin that is compressed drains (papers/004 section 7.3.1, observation 2) and folds across the direction
-//! of compression. The thesis leaves the prediction open; the linear model here is labelled as predicted and its
-//! coefficients have names.
+//! of compression. The thesis gives no prediction; the linear model here is labelled as predicted and its
+//! coefficients are named fields.
 
 use glam::{DMat2, DVec2, DVec3, Vec3};
 
@@ -57,12 +57,13 @@ pub fn triangle_strain(rest: [Vec3; 3], deformed: [Vec3; 3]) -> Option<SurfaceSt
 
 /// Strain at each point when points move to `deformed`: the mean of its triangles weighted by rest area.
 ///
-/// Directions are averaged as axes (a direction and its opposite are one). Points without triangles have no strain.
+/// Directions are averaged as axes (a direction and its opposite are the same axis). Points without triangles have no
+/// strain.
 ///
 /// # Panics
-/// When `deformed` has another length than the mesh's points.
+/// The length of `deformed` differs from the number of the mesh's points.
 pub fn point_strain(mesh: &Mesh, deformed: &[Vec3]) -> Vec<SurfaceStrain> {
-    assert_eq!(mesh.points.len(), deformed.len(), "one deformed place a point");
+    assert_eq!(mesh.points.len(), deformed.len(), "one deformed position per point");
     let mut sums = vec![SurfaceStrain::default(); mesh.points.len()];
     let mut weights = vec![0.0f32; mesh.points.len()];
     for triangle in &mesh.triangles {
@@ -129,7 +130,7 @@ impl Default for StrainModel {
     }
 }
 
-/// What the model says of one place.
+/// The model's prediction at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StrainPrediction {
     /// `mu_i / mu_n`, 0 to 2.
@@ -151,7 +152,7 @@ impl StrainModel {
         }
     }
 
-    /// Provenance of anything made with the model.
+    /// Provenance of data made with the model.
     pub fn provenance(&self, of: &str) -> Provenance {
         Provenance {
             of: of.to_owned(),
@@ -178,7 +179,7 @@ mod tests {
         assert!((s.largest - 0.2).abs() < 1e-5 && (s.smallest + 0.3).abs() < 1e-5, "{s:?}");
         assert!((s.area - (1.2 * 0.7 - 1.0)).abs() < 1e-5);
         assert!((s.compression.y.abs() - 1.0).abs() < 1e-4);
-        // Simple shear by g: stretches are those of [[1, g], [0, 1]], area stays.
+        // Simple shear by g: the stretches are those of [[1, g], [0, 1]], area stays.
         let s = triangle_strain(REST, REST.map(|p| p + Vec3::X * 0.5 * p.y)).unwrap();
         let high = 0.25 + (0.0625f32 + 1.0).sqrt();
         assert!((s.largest - (high - 1.0)).abs() < 1e-5 && s.area.abs() < 1e-5, "{s:?}");

@@ -1,10 +1,10 @@
-//! What happens when: keyframed tracks of a sequence (`sequence.json`).
+//! A performance over time: keyframed tracks of a sequence (`sequence.json`).
 //!
 //! Times are seconds from the start. A track is a constant or keys; between two keys it follows the easing of the
 //! earlier one, before the first and after the last key it holds.
 //!
 //! Lengths are metres and positions are relative to the middle of the face between the eyes, with the head's axes:
-//! +X the character's left, +Y up, +Z out of the face. So a sequence plays on every head.
+//! +X the character's left, +Y up, +Z out of the face. So a sequence fits every head.
 //!
 //! ```
 //! use rubor_rig::timeline::Sequence;
@@ -41,7 +41,7 @@ pub struct Sequence {
     /// What happens, in words.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub description: String,
-    /// Frames a second.
+    /// Frames per second.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub fps: f64,
     /// Length in seconds.
@@ -57,11 +57,12 @@ pub struct Sequence {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub states: BTreeMap<String, Track<f32>>,
     /// Weight of single shapes, added to what expressions do. `eyeBlink` moves both eyes. Weights below 0 and above 1 are
-    /// used as they stand.
+    /// used unclamped.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub shapes: BTreeMap<String, Track<f32>>,
     /// A recorded performance that adds tracks of shapes and of the head. Tracks written here win over recorded ones.
-    /// The rig reads no recordings: whoever loads the sequence does (`rubor_assets::import::capture::load_into`).
+    /// The rig reads no recordings; the program that loads the sequence does
+    /// (`rubor_assets::import::capture::load_into`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capture: Option<Capture>,
     /// Motion of the head as a whole.
@@ -70,19 +71,19 @@ pub struct Sequence {
     /// Where the eyes look, and their pupils.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eyes: Option<Eyes>,
-    /// Blinks, saccades, breath and sway that nobody keys.
+    /// Blinks, saccades, breath and sway, which are not keyed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub life: Option<Life>,
     /// Camera.
     #[serde(default)]
     pub camera: Camera,
-    /// Lights; without any, and without an environment, the renderer brings its own.
+    /// Lights; without any, and without an environment, the renderer uses its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<Light>,
     /// Light from all around.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub environment: Option<Environment>,
-    /// Where it was read from.
+    /// The text that it was read from.
     #[serde(skip)]
     pub source: Source,
 }
@@ -147,7 +148,7 @@ pub struct Camera {
     pub elevation_degrees: Track<f32>,
 }
 
-/// A picture in a photographer's words, placed by the head's own measures.
+/// A picture in a photographer's terms, scaled to the size of the head.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub enum Framing {
@@ -167,7 +168,7 @@ pub struct Light {
     /// Such as `key`, `fill`, `rim`; for messages only.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
-    /// What it is.
+    /// Kind of the light.
     pub kind: LightKind,
     /// Linear Rec. 709, each 0 or more.
     #[serde(default = "white")]
@@ -207,7 +208,7 @@ pub enum LightKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct Environment {
-    /// A built-in environment or the path of an equirectangular HDR image; whoever renders finds it.
+    /// A built-in environment or the path of an equirectangular HDR image; the program that renders loads it.
     pub name: String,
     /// Factor of its radiance, 0 or more.
     #[serde(default = "unit")]
@@ -223,7 +224,7 @@ pub struct Environment {
 pub enum Track<T> {
     /// The same at all times.
     Constant(T),
-    /// Strictly later and later; at least one.
+    /// Keys at strictly increasing times; at least one.
     Keys(Vec<Key<T>>),
 }
 
@@ -237,16 +238,16 @@ pub struct Key<T> {
     pub t: f64,
     /// Value at that time.
     pub v: T,
-    /// The way to the next key.
+    /// Interpolation to the next key.
     #[serde(default)]
     pub ease: Ease,
 }
 
-/// The way from one key to the next. Each starts at 0 and ends at 1 exactly.
+/// The interpolation from one key to the next. Each starts at 0 and ends at 1 exactly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub enum Ease {
-    /// Same speed all the way.
+    /// Constant speed.
     #[default]
     Linear,
     /// Slow at both ends: `3u^2 - 2u^3`.
@@ -275,7 +276,7 @@ impl Ease {
         Ease::Step,
     ];
 
-    /// Share of the way at a share `u` of the time, both 0 to 1.
+    /// Fraction of the change at a fraction `u` of the time, both 0 to 1.
     pub fn apply(self, u: f64) -> f64 {
         let u = u.clamp(0.0, 1.0);
         match self {
@@ -365,7 +366,7 @@ impl<T: TrackValue> Track<T> {
         }
     }
 
-    /// Every value that stands in it, with the path of the value from the track.
+    /// Every value in the track, with the path from the track to it.
     fn values(&self) -> Vec<(Vec<Step>, T)> {
         match self {
             Track::Constant(value) => vec![(Vec::new(), *value)],
@@ -524,7 +525,7 @@ pub const DEMO_SEQUENCE_JSON: &str = include_str!("demo_sequence.json");
 
 /// Largest weight of an expression or state.
 const STRONGEST_WEIGHT: f32 = 2.0;
-/// A day: what is longer is a mistake, and the number of its frames would not fit.
+/// A day: a longer duration is a mistake, and the number of its frames would overflow.
 const LONGEST_S: f64 = 86_400.0;
 /// Faster than any camera that films faces.
 const FASTEST_FPS: f64 = 10_000.0;
@@ -533,7 +534,7 @@ impl Sequence {
     /// Reads and checks a sequence. `file` is the name that messages give it.
     ///
     /// # Errors
-    /// The first thing that is wrong whatever rig and head will be used, with its place.
+    /// The first fault that depends on neither rig nor head, with its place.
     pub fn from_json(file: &str, text: &str) -> Result<Self, RigError> {
         let (mut sequence, source) = json::from_str::<Self>(file, text)?;
         sequence.source = source;
@@ -581,7 +582,7 @@ impl Sequence {
 
     /// Number of frames: frame i stands at i / fps, and the last one before `duration`. At least 1.
     pub fn frame_count(&self) -> u32 {
-        // A duration that is a whole number of frames but for rounding has no extra frame.
+        // A duration that is a whole number of frames up to rounding has no extra frame.
         const ROUNDING: f64 = 1e-6;
         ((self.duration * self.fps - ROUNDING).ceil() as u32).max(1)
     }
@@ -597,7 +598,7 @@ impl Sequence {
     /// The first violation, with its place if the sequence was read from a text.
     pub fn check(&self) -> Result<(), RigError> {
         if !(self.fps > 0.0 && self.fps <= FASTEST_FPS) {
-            let expected = "frames a second, more than 0 and at most 10000";
+            let expected = "frames per second, more than 0 and at most 10000";
             return self.wrong(&steps!["fps"], &self.fps.to_string(), expected);
         }
         if !(self.duration > 0.0 && self.duration <= LONGEST_S) {
@@ -700,13 +701,13 @@ impl Sequence {
             self.check_track(&steps!["eyes", "pupilMm"], &eyes.pupil_mm, (1.5, 9.0))?;
         }
         let Some(life) = &self.life else { return Ok(()) };
-        // Written so that NaN fails.
+        // NaN fails this comparison too.
         if !(life.blinks >= 0.0 && life.blinks <= 4.0) {
             return self.wrong(&steps!["life", "blinks"], &life.blinks.to_string(), "a number from 0 to 4");
         }
         let breaths = life.breaths_per_minute;
         if !(4.0..=60.0).contains(&breaths) {
-            let expected = "breaths a minute, 4 to 60";
+            let expected = "breaths per minute, 4 to 60";
             return self.wrong(&steps!["life", "breathsPerMinute"], &breaths.to_string(), expected);
         }
         let factor = (0.0, 5.0);

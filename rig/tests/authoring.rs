@@ -432,7 +432,7 @@ fn combinations_follow_their_drivers() {
     assert_eq!(corrective("min", [0.5, 0.75, 1.0, 0.0]), 0.5);
     assert_eq!(corrective("min", [0.0, 1.0, 1.0, 0.0]), 0.0);
     assert_eq!(corrective("product", [1.0, 1.0, 1.0, 0.5]), 1.0, "added to its own weight, clamped");
-    // A driver of ARKit that the head lacks: noted, and no corrective at its other drivers' whim.
+    // The head lacks an ARKit driver: there is a note, and the other drivers alone do not trigger the corrective.
     let lacking = self::head(&["jawOpen", "smileOpen"], &[], &[]);
     let (bound, notes) = BoundRig::new(&lacking, &rig(&text("min"))).unwrap();
     assert_eq!(notes.len(), 1);
@@ -586,7 +586,7 @@ fn eyes_and_life_move_the_shapes_that_they_name() {
         assert!((left.shapes[index(name)] - weight).abs() < 1e-6, "{name}: {}", left.shapes[index(name)]);
     }
     assert_eq!((left.pupil_mm, still.pupil_mm), (6.0, 4.7));
-    // Nothing written, nothing moved.
+    // An empty sequence moves nothing.
     assert_eq!(face(r#""life": {}"#, 3.0), still);
     let alive = r#""life": { "seed": 3, "blinks": 1, "breathing": 1, "sway": 1 }"#;
     let blinks = (0..600).map(|i| face_weight(&face(alive, f64::from(i) * 0.1), index("eyeBlinkLeft")));
@@ -781,12 +781,12 @@ fn tracks_of_shapes_pass_as_authored_and_sums_of_expressions_are_held() {
         weights(r#"{"fps": 30, "duration": 1, "shapes": {"jawOpen": -0.5}, "expressions": {"open": 1}}"#)[0],
         0.25
     );
-    // Blinks of the living do not double a closed eye.
+    // Involuntary blinks do not close a closed eye further.
     let eyes = self::head(&["eyeLookOutLeft"], &[], &[]);
     let text = r#"{"fps": 30, "duration": 1, "shapes": {"eyeLookOutLeft": 0.9}, "eyes": {"yawDegrees": 30}}"#;
     let sequence = Sequence::from_json("s.json", text).unwrap();
     assert_eq!(Evaluator::new(&eyes, &self::rig("{}"), &sequence).unwrap().0.face_at(0.0).shapes[0], 1.0);
-    // Segments of in-betweens go on: 1.5 lies twice the way from puff50 to puff; -0.5 once the way back.
+    // Segments of in-betweens are extrapolated: 1.5 lies twice the way from puff50 to puff; -0.5 once the way back.
     assert_eq!(weights(r#"{"fps": 30, "duration": 1, "shapes": {"puff": 1.5}}"#)[1..], [2.0, -1.0]);
     assert_eq!(weights(r#"{"fps": 30, "duration": 1, "shapes": {"puff": -0.5}}"#)[1..], [0.0, -1.0]);
 }

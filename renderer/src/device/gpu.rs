@@ -1,4 +1,4 @@
-//! The device: choosing an adapter, or taking one that is there; buffers and textures.
+//! The device: opens an adapter or takes over an open device; makes buffers and textures.
 
 use std::sync::{Arc, Mutex};
 
@@ -18,11 +18,11 @@ pub struct Gpu {
     pub info: wgpu::AdapterInfo,
     /// True when passes can be timed.
     pub has_timestamps: bool,
-    /// Whether uniform buffers are bound as storage buffers: Mesa's software driver compiles a shader again for each new
-    /// value of a uniform that a loop or a branch depends on, and keeps the code.
+    /// Whether uniform buffers are bound as storage buffers: Mesa's software driver recompiles a shader for each new
+    /// value of a uniform that a loop or a branch depends on, and never frees the code.
     pub(crate) stores_uniforms: bool,
     failure: Arc<Mutex<Option<String>>>,
-    /// The submission that the next result comes from.
+    /// The submission that produces the next result.
     wanted: Arc<Mutex<Option<wgpu::SubmissionIndex>>>,
 }
 
@@ -80,7 +80,7 @@ pub(crate) async fn list_adapters() -> Vec<AdapterDescription> {
     adapters().await.iter().enumerate().map(|(i, a)| describe(i, a)).collect()
 }
 
-/// Features that are used where the adapter has them; nothing needs them.
+/// Optional features, used where the adapter has them.
 const WELCOME_FEATURES: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::PRIMITIVE_INDEX);
 
@@ -88,7 +88,7 @@ impl Gpu {
     /// Opens the best adapter, or the one whose index or part of whose name (any letter case) is `wanted`.
     ///
     /// # Errors
-    /// No adapter, none of that name, or the driver refuses.
+    /// No adapter exists, none has that name, or the driver refuses.
     pub async fn new(wanted: Option<&str>) -> Result<Self, RenderError> {
         let all = adapters().await;
         if all.is_empty() {
@@ -119,7 +119,7 @@ impl Gpu {
             max_buffer_size: most.max_buffer_size,
             max_storage_buffer_binding_size: most.max_storage_buffer_binding_size,
             max_storage_buffers_per_shader_stage: if info.device_type == wgpu::DeviceType::Cpu {
-                // Uniforms are among them there.
+                // The limit includes uniforms on this device.
                 most.max_storage_buffers_per_shader_stage
             } else {
                 wgpu::Limits::default().max_storage_buffers_per_shader_stage
@@ -167,14 +167,15 @@ impl Gpu {
         }
     }
 
-    /// Says which submission the next result comes from, so that who waits for it need not wait for later ones.
+    /// Sets the submission that produces the next result, so that a wait for the result does not wait for later
+    /// submissions.
     pub(crate) fn wants(&self, submission: wgpu::SubmissionIndex) {
         if let Ok(mut slot) = self.wanted.lock() {
             *slot = Some(submission);
         }
     }
 
-    /// What [`Gpu::wants`] said, once.
+    /// Takes the submission set by [`Gpu::wants`].
     #[cfg(not(target_arch = "wasm32"))]
     pub(crate) fn take_wanted(&self) -> Option<wgpu::SubmissionIndex> {
         self.wanted.lock().ok().and_then(|mut slot| slot.take())

@@ -1,21 +1,21 @@
-//! Images between passes: made by the pass that needs them, used again once nobody holds them.
+//! Images between passes: made by the pass that needs them, reused when the last reference is dropped.
 
 use std::sync::Arc;
 
 use super::gpu::Gpu;
 
-/// What an image is.
+/// Description of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ImageSpec {
     pub(crate) size: [u32; 2],
     pub(crate) layers: u32,
-    /// Whether shaders see an array, also of one layer.
+    /// Whether shaders see an array, even with one layer.
     pub(crate) is_array: bool,
     pub(crate) format: wgpu::TextureFormat,
     pub(crate) usage: wgpu::TextureUsages,
 }
 
-/// An image of a frame. Clones are the same image; it can be used again when the last is dropped.
+/// An image of a frame. Clones are the same image; it can be reused when the last is dropped.
 #[derive(Clone)]
 pub(crate) struct Image(Arc<Slot>);
 
@@ -32,7 +32,7 @@ pub(crate) struct Images {
     frame: u64,
 }
 
-/// Frames after which an image that no pass asks for is dropped: two, as methods may alternate.
+/// Number of frames after which an unused image is dropped: two, because methods may alternate.
 const KEPT_FRAMES: u64 = 2;
 
 impl ImageSpec {
@@ -48,7 +48,7 @@ impl ImageSpec {
         }
     }
 
-    /// Light: storage of half floats.
+    /// A storage image of half floats, for light.
     pub(crate) fn light(size: [u32; 2]) -> Self {
         Self::storage(size, wgpu::TextureFormat::Rgba16Float)
     }
@@ -65,7 +65,7 @@ impl ImageSpec {
         }
     }
 
-    /// The same with more uses.
+    /// The same with additional uses.
     pub(crate) fn also(self, usage: wgpu::TextureUsages) -> Self {
         Self { usage: self.usage | usage, ..self }
     }
@@ -82,7 +82,7 @@ impl ImageSpec {
 }
 
 impl Image {
-    /// An image of its own, which no frame takes over: what is carried from frame to frame.
+    /// An image outside the pool, for data that is carried from frame to frame.
     pub(crate) fn new(gpu: &Gpu, label: &'static str, spec: ImageSpec) -> Self {
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
@@ -105,7 +105,7 @@ impl Image {
         Self(Arc::new(Slot { spec, texture, view }))
     }
 
-    /// All of it.
+    /// A view of all layers.
     pub(crate) fn view(&self) -> &wgpu::TextureView {
         &self.0.view
     }
@@ -118,7 +118,7 @@ impl Image {
         self.0.spec.size
     }
 
-    /// One layer.
+    /// A view of one layer.
     pub(crate) fn layer(&self, layer: u32) -> wgpu::TextureView {
         self.0.texture.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2),
@@ -135,7 +135,7 @@ impl Image {
 }
 
 impl Images {
-    /// An image that nobody else holds. Its texels are whatever was there.
+    /// An image without other references. Its texels are undefined.
     pub(crate) fn take(&mut self, gpu: &Gpu, label: &'static str, spec: ImageSpec) -> Image {
         let frame = self.frame;
         let free = self.slots.iter_mut().find(|(slot, _)| slot.spec == spec && Arc::strong_count(slot) == 1);
@@ -148,7 +148,7 @@ impl Images {
         image
     }
 
-    /// Drops what the last frames did not ask for; the first thing of a frame.
+    /// Drops images that the last frames did not use; called at the beginning of a frame.
     pub(crate) fn begin_frame(&mut self) {
         self.frame += 1;
         let frame = self.frame;

@@ -4,7 +4,7 @@ use super::gpu::Gpu;
 use super::images::Image;
 use super::wgsl::{Binding, Program};
 
-/// A resource under the name of the variable that it is bound to.
+/// A resource with the name of the shader variable that it is bound to.
 pub(crate) type Resource<'a> = (&'static str, wgpu::BindingResource<'a>);
 
 /// What can be bound.
@@ -57,7 +57,7 @@ pub(crate) struct RasterKernel {
     pub(crate) bindings: Bindings,
 }
 
-/// What pipelines that rasterise differ in.
+/// Description of a pipeline that rasterises.
 pub(crate) struct Raster<'a> {
     pub(crate) label: &'static str,
     pub(crate) program: Program,
@@ -65,7 +65,7 @@ pub(crate) struct Raster<'a> {
     pub(crate) vertex: &'a str,
     pub(crate) fragment: Option<&'a str>,
     pub(crate) targets: &'a [Option<wgpu::ColorTargetState>],
-    /// What depth has to be, compared with the one that is there.
+    /// Comparison of a fragment's depth with the stored depth.
     pub(crate) nearer: wgpu::CompareFunction,
     pub(crate) writes_depth: bool,
 }
@@ -79,7 +79,7 @@ impl Bindings {
     /// One bind group per group of the shader. Resources that the shader does not use are left out.
     ///
     /// # Panics
-    /// A variable of the shader has no resource: every pass runs in tests.
+    /// A variable of the shader has no resource. Tests run every pass, so this cannot reach a user.
     pub(crate) fn bind(&self, gpu: &Gpu, resources: &[Resource<'_>]) -> Vec<wgpu::BindGroup> {
         let group = |(group, layout): (usize, &wgpu::BindGroupLayout)| {
             let entries: Vec<_> = self
@@ -141,7 +141,7 @@ impl Kernel {
 }
 
 impl RasterKernel {
-    /// A kernel of a vertex and perhaps a fragment entry point.
+    /// A pipeline with a vertex and, optionally, a fragment entry point.
     pub(crate) fn new(gpu: &Gpu, raster: &Raster<'_>) -> Self {
         let entries: Vec<&str> = std::iter::once(raster.vertex).chain(raster.fragment).collect();
         let linked = raster.program.link(&entries, gpu.stores_uniforms);

@@ -1,11 +1,11 @@
-//! The device and how a frame is recorded on it.
+//! The device, and the recording of a frame.
 //!
 //! ```text
 //! Gpu (own or given) --Recorder: passes, images, times--> commands --submit--> Readback --bytes
 //! wgsl: modules --> shaders with named bindings --> kernel: pipelines that bind by name
 //! ```
 //!
-//! Nothing here waits for the device but `native`, which a browser build leaves out.
+//! Only `native` waits for the device; a browser build leaves it out.
 
 mod gpu;
 pub(crate) mod images;

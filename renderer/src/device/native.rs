@@ -1,4 +1,4 @@
-//! For programs outside of a browser: opening a device and waiting for it. Nothing else in this crate waits.
+//! Opens a device and waits for it, for programs outside of a browser. Nothing else in this crate waits.
 
 use std::future::Future;
 use std::pin::pin;
@@ -10,7 +10,7 @@ use crate::error::RenderError;
 /// Opens the best adapter, or the one whose index or part of whose name (any letter case) is `wanted`.
 ///
 /// # Errors
-/// No adapter, none of that name, or the driver refuses.
+/// No adapter exists, none has that name, or the driver refuses.
 pub fn open(wanted: Option<&str>) -> Result<Gpu, RenderError> {
     pollster::block_on(Gpu::new(wanted))
 }
@@ -20,8 +20,7 @@ pub fn adapters() -> Vec<AdapterDescription> {
     pollster::block_on(super::gpu::list_adapters())
 }
 
-/// Waits for a result that needs the device to finish its work, and for no more of that work than the result says it
-/// needs.
+/// Waits for a result that needs the device to finish its work, but only for the submission that produces the result.
 pub fn wait<T>(gpu: &Gpu, future: impl Future<Output = T>) -> T {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());
@@ -31,7 +30,7 @@ pub fn wait<T>(gpu: &Gpu, future: impl Future<Output = T>) -> T {
         }
         let wait = wgpu::PollType::Wait { submission_index: gpu.take_wanted(), timeout: None };
         if gpu.device.poll(wait).is_err() {
-            // A lost device answers what was asked of it with errors, in its own time.
+            // A lost device completes pending requests with errors later.
             std::thread::yield_now();
         }
     }

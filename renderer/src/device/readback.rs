@@ -1,4 +1,5 @@
-//! From the device to the host, without waiting: a copy in the frame's commands, bytes when the device is done.
+//! From the device to the host, without waiting: the frame's commands make a copy, whose bytes are available when the
+//! device is done.
 
 use futures_channel::oneshot;
 
@@ -20,7 +21,7 @@ pub(crate) struct TextureReadback {
 }
 
 impl Readback {
-    /// Room for `bytes` bytes.
+    /// A readback buffer of `bytes` bytes.
     pub(crate) fn new(gpu: &Gpu, label: &str, bytes: u64) -> Self {
         let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
@@ -38,7 +39,7 @@ impl Readback {
         readback
     }
 
-    /// Where the copy goes.
+    /// The buffer that the copy is written to.
     pub(crate) fn buffer(&self) -> &wgpu::Buffer {
         &self.staging
     }
@@ -50,7 +51,7 @@ impl Readback {
     pub(crate) async fn read(self) -> Result<Vec<u8>, RenderError> {
         let (sender, receiver) = oneshot::channel();
         self.staging.map_async(wgpu::MapMode::Read, .., |result| {
-            // Nobody may wait for it any more.
+            // The receiver may have been dropped.
             let _ = sender.send(result);
         });
         let lost = |reason: String| RenderError::Lost(reason);
@@ -123,11 +124,11 @@ impl Gpu {
         Ok(bytes)
     }
 
-    /// Resolves when the device is done with all that was submitted.
+    /// Resolves when the device is done with everything that was submitted.
     pub(crate) async fn idle(&self) -> Result<(), RenderError> {
         let (sender, receiver) = oneshot::channel();
         self.queue.on_submitted_work_done(move || {
-            // Nobody may wait for it any more.
+            // The receiver may have been dropped.
             let _ = sender.send(());
         });
         receiver.await.map_err(|e| RenderError::Lost(e.to_string()))?;

@@ -1,4 +1,4 @@
-//! Recording a frame: what every pass is handed.
+//! The recorder of a frame, which every pass receives.
 
 use bytemuck::Pod;
 
@@ -15,13 +15,13 @@ pub(crate) struct Recorder<'a> {
     pub(crate) images: &'a mut Images,
 }
 
-/// Where triangles are drawn.
+/// The attachments that triangles are drawn to.
 pub(crate) struct Attachments<'a> {
     pub(crate) colors: Vec<Option<wgpu::RenderPassColorAttachment<'a>>>,
     pub(crate) depth: Option<wgpu::RenderPassDepthStencilAttachment<'a>>,
 }
 
-/// A colour attachment that begins as `load` says and is kept.
+/// A colour attachment with the load operation `load`; the result is stored.
 pub(crate) fn color_attachment(
     view: &wgpu::TextureView,
     load: wgpu::LoadOp<wgpu::Color>,
@@ -34,7 +34,7 @@ pub(crate) fn color_attachment(
     })
 }
 
-/// A depth attachment that begins as `load` says and is kept.
+/// A depth attachment with the load operation `load`; the result is stored.
 pub(crate) fn depth_attachment(
     view: &wgpu::TextureView,
     load: wgpu::LoadOp<f32>,
@@ -52,7 +52,7 @@ impl Recorder<'_> {
         self.images.take(self.gpu, label, spec)
     }
 
-    /// Hands the commands so far to the device; recording goes on.
+    /// Submits the commands so far; recording continues.
     pub(crate) fn submit(&mut self) -> wgpu::SubmissionIndex {
         let fresh = self.gpu.device.create_command_encoder(&Default::default());
         self.gpu.queue.submit([std::mem::replace(self.encoder, fresh).finish()])
@@ -68,7 +68,7 @@ impl Recorder<'_> {
         self.dispatch_each(kernel, std::iter::once((resources.to_vec(), workgroups)));
     }
 
-    /// A compute pass of one dispatch for each set of resources; nothing where there is none.
+    /// A compute pass with one dispatch per set of resources; no pass if there are none.
     pub(crate) fn dispatch_each<'r>(
         &mut self,
         kernel: &Kernel,
@@ -89,7 +89,7 @@ impl Recorder<'_> {
         }
     }
 
-    /// A render pass of one draw for each set of resources; it clears also where there is none.
+    /// A render pass with one draw per set of resources; it clears even if there are none.
     pub(crate) fn draw_each<'r>(
         &mut self,
         kernel: &RasterKernel,
@@ -120,8 +120,8 @@ impl Recorder<'_> {
 
 /// The triangles of a draw.
 pub(crate) enum Draw<'a> {
-    /// So many corners.
+    /// Number of corners.
     Corners(u32),
-    /// So many corners, by an index buffer.
+    /// Number of corners, and their index buffer.
     Indexed(&'a wgpu::Buffer, u32),
 }

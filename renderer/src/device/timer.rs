@@ -7,7 +7,7 @@ use crate::error::RenderError;
 /// Milliseconds of one frame on the GPU.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameTimes {
-    /// Each pass, in order; a pass that runs several times a frame is there several times.
+    /// Each pass, in order; a pass that runs several times per frame is listed as often.
     pub passes_ms: Vec<(&'static str, f64)>,
     /// From the beginning of the first pass to the end of the last.
     pub frame_ms: f64,
@@ -21,16 +21,16 @@ pub struct PassTimer {
     names: Vec<&'static str>,
 }
 
-/// The times of a frame that was recorded.
+/// The times of a recorded frame.
 pub struct PendingTimes {
     names: Vec<&'static str>,
     ticks: Option<Readback>,
     period_ns: f64,
 }
 
-/// Passes that a query set times.
+/// Number of passes per query set.
 const PASSES_PER_SET: usize = 64;
-/// Bytes of the times of a pass: two ticks.
+/// Bytes per timed pass: two timestamps.
 const PASS_BYTES: u64 = 16;
 
 impl PassTimer {
@@ -39,7 +39,7 @@ impl PassTimer {
         self.names.clear();
     }
 
-    /// The set and the first query of the next pass; nothing on a device without timestamps.
+    /// The set and the first query of the next pass; `None` on a device without timestamps.
     fn next(&mut self, gpu: &Gpu, name: &'static str) -> Option<(&wgpu::QuerySet, u32)> {
         if !gpu.has_timestamps {
             return None;
@@ -101,7 +101,7 @@ impl PassTimer {
         })
     }
 
-    /// Copies the times of the passes so far to where the host can read them once the device is done; the last thing in a
+    /// Copies the times of the passes so far to a buffer that the host can read; the last command of a
     /// frame's encoder.
     pub fn finish(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder) -> PendingTimes {
         let total = self.names.len();

@@ -4,8 +4,8 @@
 //! modules of passes, flags, constants from Rust --wesl--> what the entry points use --number--> WGSL, names of bindings
 //! ```
 //!
-//! A shader says what it takes with `import package::view::View;`, leaves parts out with `@if(flag)`, and reads numbers
-//! that Rust knows from `package::constants`. Its bindings have a group and no number: they are numbered here in the
+//! A shader imports with `import package::view::View;`, leaves parts out with `@if(flag)`, and reads numbers
+//! defined in Rust from `package::constants`. Its bindings have a group but no number: this module numbers them in the
 //! order of their declaration, and passes bind resources by name.
 
 use std::collections::HashMap;
@@ -31,7 +31,7 @@ macro_rules! module {
 }
 pub(crate) use module;
 
-/// Modules that any shader may import.
+/// Modules that every shader may import.
 const SHARED: [Module; 5] = [
     module!("blocks", "../shared/blocks.wesl"),
     module!("math", "../shared/math.wesl"),
@@ -40,7 +40,7 @@ const SHARED: [Module; 5] = [
     module!("view", "../shared/view.wesl"),
 ];
 
-/// A number that Rust tells a shader.
+/// A number that Rust passes to a shader.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Constant {
     Bool(bool),
@@ -66,7 +66,7 @@ impl From<f32> for Constant {
     }
 }
 
-/// What a shader is made of.
+/// Parts of a shader.
 #[derive(Clone, Debug)]
 pub(crate) struct Program {
     root: Module,
@@ -83,7 +83,7 @@ pub(crate) struct Binding {
     pub(crate) binding: u32,
 }
 
-/// A shader that a device takes.
+/// A linked shader, ready for the device.
 #[derive(Clone, Debug)]
 pub(crate) struct Linked {
     pub(crate) wgsl: String,
@@ -102,7 +102,7 @@ impl Program {
         self
     }
 
-    /// Keeps what stands behind `@if(flag)` where `on`.
+    /// Keeps the code behind `@if(flag)` if `on`.
     pub(crate) fn flag(mut self, flag: &'static str, on: bool) -> Self {
         if on {
             self.flags.push(flag);
@@ -116,10 +116,11 @@ impl Program {
         self
     }
 
-    /// Links what `entries` use. `stored_uniforms` turns uniform buffers into storage buffers (see [`crate::device::Gpu`]).
+    /// Links the entry points `entries` and the code that they use. `stored_uniforms` turns uniform buffers into
+    /// storage buffers (see [`crate::device::Gpu`]).
     ///
     /// # Panics
-    /// The shader does not parse or an import is missing: tests link every shader.
+    /// The shader does not parse or an import is missing. Tests link every shader, so this cannot reach a user.
     pub(crate) fn link(&self, entries: &[&str], stored_uniforms: bool) -> Linked {
         let mut resolver = VirtualResolver::new();
         let path = |text: &str| text.parse().unwrap_or_else(|e| panic!("module path {text}: {e}"));

@@ -1,6 +1,6 @@
-//! How a frame is put together: [`realtime`] in one go, [`reference`] with as many samples as it is given.
+//! How a frame is put together: [`realtime`] records it in one go, [`reference`] accumulates batches of samples.
 //!
-//! [`stages`] holds what both do alike. A stage calls passes; it knows no method of theirs.
+//! [`stages`] holds the stages that both share. A stage calls passes and does not know their methods.
 
 pub(crate) mod realtime;
 pub(crate) mod reference;
@@ -49,7 +49,7 @@ pub(crate) struct Passes {
     pub(crate) tone_map: ToneMap,
     pub(crate) resolve: Resolve,
     pub(crate) display: Display,
-    /// Where the settings ask for it.
+    /// Present if the settings ask for it.
     pub(crate) antialias: Option<Antialias>,
     pub(crate) transmittance: Option<(Arc<Profile>, Transmittance)>,
 }
@@ -63,13 +63,13 @@ pub(crate) struct Frame<'a> {
     pub(crate) lamps: Vec<Light>,
     pub(crate) needs: Needs,
     pub(crate) past: &'a mut Past,
-    /// Where the picture goes; an image of the frame's own without one.
+    /// Target of the picture; without one the frame makes an image.
     pub(crate) into: Option<&'a wgpu::TextureView>,
-    /// Images that somebody wants to read.
+    /// Images that will be read back.
     pub(crate) kept: BTreeMap<Channel, Image>,
 }
 
-/// The previous frame: all that one frame leaves to the next.
+/// The history: all data that one frame passes to the next.
 #[derive(Default)]
 pub(crate) struct Past {
     pub(crate) history: Option<History>,
@@ -78,7 +78,7 @@ pub(crate) struct Past {
 }
 
 impl Past {
-    /// Forgets it. The count of frames goes on.
+    /// Clears the history. The frame count continues.
     pub(crate) fn forget(&mut self) {
         *self = Self { frames: self.frames, ..Self::default() };
     }
@@ -107,7 +107,7 @@ impl Passes {
         }
     }
 
-    /// Makes what frames with these settings need, unless it is there.
+    /// Makes the passes that frames with these settings need, unless they exist.
     ///
     /// # Errors
     /// The profile cannot be tabulated, or the antialiasing is out of range.

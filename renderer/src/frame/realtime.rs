@@ -6,7 +6,7 @@ use crate::device::{Image, Recorder};
 use crate::error::RenderError;
 use crate::passes::diffusion::Diffusion;
 
-/// Records a frame; the picture is in the image that is returned, or where the frame was told to put it.
+/// Records a frame; the picture is in the returned image, or in the frame's target.
 ///
 /// # Errors
 /// The antialiasing lacks an input.

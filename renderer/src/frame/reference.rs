@@ -1,7 +1,7 @@
 //! A frame with the integral over the surface in place of a method that draws in one go.
 //!
-//! The stages are those of [`super::realtime`]; between them the deformed surface comes back to the host, which chooses
-//! samples, and batches are handed to the device one at a time.
+//! The stages are those of [`super::realtime`]; between them the deformed surface is read back by the host, which
+//! chooses samples, and batches are submitted one at a time.
 
 use glam::Vec3;
 
@@ -71,7 +71,7 @@ pub(crate) async fn draw(
     Ok((frame.antialias(r, samples)?, noise))
 }
 
-/// The surface of a head on its way to the host.
+/// The surface of a head, being read back.
 struct Copies {
     triangles: Readback,
     vertices: Readback,

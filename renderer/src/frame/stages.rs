@@ -10,12 +10,12 @@ use crate::scene::lamp::{Illumination, place_lights};
 use crate::scene::placement::{average_light, receivers};
 use crate::scene::view::{Seen, pixels_per_mm, view};
 
-/// What the samples of a pixel have come to so far.
+/// Results of the samples of a pixel so far.
 #[derive(Default)]
 pub(crate) struct Samples {
     seen: Vec<Seen>,
     displayed: Vec<Image>,
-    /// The light of the last sample, which the next one may share.
+    /// The light of the last sample, which the next one may reuse.
     lit: Option<Lit>,
     velocity: Option<Image>,
 }
@@ -42,7 +42,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Places in a pixel at which this frame looks.
+    /// Sample positions within a pixel in this frame.
     pub(crate) fn subsamples(&self) -> &'static [Subsample] {
         self.settings.antialias().mode.subsamples(self.past.frames)
     }
@@ -54,7 +54,7 @@ impl<'a> Frame<'a> {
         let shading_jitter = all
             .iter()
             .fold([0.0; 2], |sum, s| [sum[0] - share * s.position_px[0], sum[1] - share * s.position_px[1]]);
-        // A camera reaches a place in the pixel by moving the image the other way.
+        // A camera samples a place in the pixel by shifting the image in the opposite direction.
         let jitters = [subsample.position_px.map(|p| -p), shading_jitter];
         let size = self.settings.frame_size();
         let view = view(self.scene, &self.lamps, size, jitters, self.past.clip_from_world);
@@ -64,7 +64,8 @@ impl<'a> Frame<'a> {
         Seen { view, pixels_per_mm, ids, depth }
     }
 
-    /// Light of what a sample sees. A second sample shares the light of the first where both see the same.
+    /// Light of the surface that a sample sees. A second sample reuses the light of the first where both see the same
+    /// surface.
     pub(crate) fn shade(
         &self,
         r: &mut Recorder<'_>,
@@ -78,7 +79,7 @@ impl<'a> Frame<'a> {
         self.passes.shade.record(r, &lighting, &self.heads, samples.lit.as_ref())
     }
 
-    /// From the light of a sample to what a display shows of it: radiance, hair and films over it, resolve, display.
+    /// From the light of a sample to display values: compose, hair and films, resolve, display.
     pub(crate) fn show(
         &mut self,
         r: &mut Recorder<'_>,
@@ -122,7 +123,7 @@ impl<'a> Frame<'a> {
         samples.lit = Some(lit);
     }
 
-    /// The samples to one picture: the image that is returned, or where the frame was told to put it.
+    /// Combines the samples into one picture: the returned image, or the frame's target.
     ///
     /// # Errors
     /// An input is missing.
@@ -169,7 +170,7 @@ impl<'a> Frame<'a> {
         Ok(picture)
     }
 
-    /// Holds images that somebody wants to read, so that no later pass takes them over.
+    /// Holds images that will be read back, so that no later pass reuses them.
     fn keep<'i>(&mut self, images: impl IntoIterator<Item = (Channel, &'i Image)>) {
         for (channel, image) in images {
             if self.settings.output.channels.contains(&channel) {

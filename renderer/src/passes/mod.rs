@@ -10,13 +10,13 @@ pub(crate) mod hair;
 pub(crate) mod resolve;
 pub(crate) mod shade;
 
-/// Workgroups of a pass in which an invocation does the pixels of blocks.wesl, for an image of a size.
+/// Workgroups of a pass whose invocations compute the pixels of blocks.wesl, for an image of a size.
 pub(crate) fn block_groups(size: [u32; 2]) -> [u32; 3] {
     const PIXELS: u32 = 16;
     [size[0].div_ceil(PIXELS), size[1].div_ceil(PIXELS), 1]
 }
 
-/// Workgroups of 8 x 8 invocations of a pixel each.
+/// Workgroups of 8 x 8 invocations with one pixel each.
 pub(crate) fn pixel_groups(size: [u32; 2]) -> [u32; 3] {
     [size[0].div_ceil(8), size[1].div_ceil(8), 1]
 }

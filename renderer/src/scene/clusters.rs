@@ -1,4 +1,4 @@
-//! Groups of neighbouring triangles: where parts of a deformed head can be, without its points.
+//! Groups of neighbouring triangles: bounds of the parts of a deformed head that do not need its points.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,8 @@ use rubor_rig::head::Head;
 
 /// Side of the cells that group triangles, metres.
 const CELL_METRES: f32 = 0.015;
-/// How far shapes turn normals, degrees: lids and lips turn by more, but their clusters bulge every way.
+/// How far shapes rotate normals, degrees: lids and lips rotate by more, but their clusters contain normals of all
+/// directions.
 const TURN_DEGREES: f32 = 25.0;
 
 /// Opaque triangles of one cell that face about the same way.
@@ -17,28 +18,28 @@ pub(crate) struct Cluster {
     center: Vec3,
     radius: f32,
     /// Middle of the normals, and the cosine of the largest angle from it to a normal, shapes included; -1 where they
-    /// point every way.
+    /// point in all directions.
     axis: Vec3,
     cosine: f32,
-    /// Shapes that move it, and by how many metres at weight 1.
+    /// Shapes that move it, and the distance at weight 1, metres.
     travel: Vec<(usize, f32)>,
 }
 
-/// A sphere in world space that part of a head is in.
+/// A sphere in world space around a part of a head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sphere {
     pub(crate) center: Vec3,
     pub(crate) radius: f32,
 }
 
-/// Who looks at clusters.
+/// A viewer of clusters.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Viewer {
     pub(crate) position: Vec3,
     pub(crate) clip_from_world: Mat4,
-    /// Size of the picture with its surroundings over its own.
+    /// Size of the picture with its margin, relative to the picture.
     pub(crate) margin: f32,
-    /// Whether what faces away counts.
+    /// Whether surfaces that face away are included.
     pub(crate) sees_backs: bool,
 }
 
@@ -140,7 +141,7 @@ pub(crate) fn visible(
             let way = viewer.position - center;
             let distance = way.length();
             if !viewer.sees_backs && c.cosine > 0.0 && distance > radius {
-                // Seen from anywhere in the sphere the viewer stands within asin(radius / distance) of this direction.
+                // Seen from any point in the sphere, the viewer is within asin(radius / distance) of this direction.
                 let spread = (radius / distance).asin() + c.cosine.acos();
                 let away = world_from_head.transform_vector3(c.axis).dot(way / distance);
                 if away < (std::f32::consts::FRAC_PI_2 + spread).min(std::f32::consts::PI).cos() {

@@ -1,4 +1,4 @@
-//! Light from everywhere: an equirectangular map, filtered once at load.
+//! Light from all directions: an equirectangular map, filtered once at load.
 //!
 //! Column 0 looks towards +Z; the middle column, -Z; row 0 is straight up. Radiance is linear Rec. 709.
 
@@ -122,12 +122,12 @@ impl EnvironmentMap {
         })
     }
 
-    /// Clear sky: a sun at 38 degrees in front on the left of someone who looks at the face, blue that pales towards the
+    /// Clear sky: a sun at 38 degrees in front on the left of a viewer of the face, blue that pales towards the
     /// horizon and about the sun, and sunlit ground.
     ///
-    /// The sun's disc is what eyes mirror: it has a radius of 5 degrees in place of a quarter, and only a third of the
-    /// sky's light, for a map casts no shadows. A directional light along (0.506, -0.616, -0.604) is the rest of it.
-    /// The mean over the sphere is about 0.5.
+    /// The sun's disc, which eyes reflect, has a radius of 5 degrees in place of a quarter, and only a third of the
+    /// sky's light, because a map casts no shadows. A directional light along (0.506, -0.616, -0.604) stands for the
+    /// rest. The mean over the sphere is about 0.5.
     pub fn sky() -> Self {
         const SUN_RADIUS: f32 = 5.0 * PI / 180.0;
         let (elevation, azimuth) = (38.0f32.to_radians(), -40.0f32.to_radians());
@@ -161,7 +161,7 @@ impl EnvironmentMap {
     /// Names of the built-in environments.
     pub const NAMES: [&str; 3] = ["studio", "soft-box", "sky"];
 
-    /// The map turned about +Y by an angle in degrees; positive turns the surroundings to the left of someone who
+    /// The map turned about +Y by an angle in degrees; positive turns the surroundings to the left of a viewer who
     /// looks along -Z.
     pub fn rotated(&self, degrees: f32) -> Self {
         let shift = (degrees / 360.0 * self.width as f32).round() as i64;

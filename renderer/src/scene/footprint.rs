@@ -1,8 +1,8 @@
-//! What the maps of a head take on the device, as they are stored and as blocks.
+//! Device memory of the maps of a head, as stored and in block formats.
 //!
 //! Papers/004 section 8.3 counts 96 KB for wrinkles in block formats; this counts the same for any head, without a
-//! device. Block formats (BC4: half a byte a texel and channel, BC5: one byte for two channels, BC7: one byte for four)
-//! hold 4 x 4 texels; a level smaller than that still takes a whole block.
+//! device. Block formats (BC4: half a byte per texel and channel, BC5: one byte for two channels, BC7: one byte for
+//! four) hold 4 x 4 texels; a level smaller than that still takes a whole block.
 
 use rubor_rig::head::SkinMaps;
 use rubor_rig::map::Map;
@@ -19,7 +19,7 @@ pub(crate) fn largest_of<'a>(maps: impl IntoIterator<Item = &'a Map>) -> [u32; 2
 /// One texture of a head.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Footprint {
-    /// What it holds.
+    /// Its contents.
     pub texture: &'static str,
     /// Texels of the largest level.
     pub size: [u32; 2],
@@ -29,7 +29,7 @@ pub struct Footprint {
     pub format: &'static str,
     /// Bytes as it is stored, all levels and layers.
     pub bytes: u64,
-    /// Block format that would do.
+    /// Suitable block format.
     pub block_format: &'static str,
     /// Bytes in that format.
     pub block_bytes: u64,
@@ -109,8 +109,8 @@ mod tests {
 
     #[test]
     fn the_wrinkles_of_the_thesis_take_what_it_says() {
-        // 256 x 256 wrinkles and eight zones of 64 x 64 in two textures: 96 KB with mip levels, of which its masks
-        // have some that ours do without.
+        // 256 x 256 wrinkles and eight zones of 64 x 64 in two textures: 96 KB with mip levels, which its masks
+        // have and ours do not.
         let zone =
             |i| WrinkleZone { name: format!("{i}"), wrinkle_map: 0, mask: Map::filled(64, 64, &[1.0]) };
         let maps = SkinMaps {

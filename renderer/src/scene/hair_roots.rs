@@ -1,4 +1,4 @@
-//! Where cropped hairs stand.
+//! Roots of cropped hairs.
 
 use std::collections::HashSet;
 
@@ -6,7 +6,7 @@ use glam::{IVec3, Vec2, Vec3};
 use rubor_rig::head::{Head, Material};
 use rubor_rig::map::Map;
 
-/// A hair as cropped_hair.wgsl reads it; the fields are described there.
+/// A hair as cropped_hair.wesl reads it; the fields are described there.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Root {
@@ -16,18 +16,18 @@ pub(crate) struct Root {
     pub(crate) look: u32,
 }
 
-/// Hairs on a square metre of fully covered skin: 110 a square centimetre, about half of a real scalp; the tint of the
-/// map stands for the others.
+/// Hairs per square metre of fully covered skin: 110 per square centimetre, about half of a real scalp; the tint of the
+/// map stands for the rest.
 const DENSITY: f32 = 1.1e6;
-/// Most hairs of a head.
+/// Largest number of hairs of a head.
 const MOST: usize = 120_000;
-/// Side that the hair map is averaged down to, texels: about 5 mm, so that single dots of stubble grow no tufts.
+/// Side that the hair map is averaged down to, texels: about 5 mm, so that single dots of stubble do not become tufts.
 const AVERAGED: u32 = 128;
-/// Cover from which hairs grow, and at which all do.
+/// Cover at which hairs begin to grow, and at which all grow.
 const COVER: [f32; 2] = [0.10, 0.62];
 /// Shortest hair as a share of the longest.
 const SHORTEST: f32 = 0.22;
-/// Skin this near to strands that are geometry (brows, lashes) is theirs, metres.
+/// Distance from strands that are geometry (brows, lashes) within which no cropped hair grows, metres.
 const CLEAR: f32 = 0.005;
 /// From the top of the head to the crown, metres: hair flows away from there.
 const CROWN: Vec3 = Vec3::new(0.006, -0.004, -0.048);
@@ -139,14 +139,14 @@ pub(crate) fn roots(head: &Head, triangles: &[[u32; 4]]) -> Vec<Root> {
     all
 }
 
-/// A direction laid on a triangle, as factors of its two edges that give a unit vector.
+/// A direction laid on a triangle, as factors of its two edges that result in a unit vector.
 fn flow(away: Vec3, [e1, e2]: [Vec3; 2], normal: Vec3) -> [f32; 2] {
     let lying = (away - normal * away.dot(normal)).normalize_or(e1.normalize_or(Vec3::X));
     // lying = x e1 + y e2 within the plane.
     let (d11, d12, d22) = (e1.dot(e1), e1.dot(e2), e2.dot(e2));
     let (l1, l2) = (lying.dot(e1), lying.dot(e2));
     let determinant = (d11 * d22 - d12 * d12).max(f32::MIN_POSITIVE);
-    // Half floats end at 65504: a sliver of a triangle.
+    // Half floats end at 65504, which a sliver of a triangle can exceed.
     [l1 * d22 - l2 * d12, l2 * d11 - l1 * d12].map(|v| (v / determinant).clamp(-6e4, 6e4))
 }
 

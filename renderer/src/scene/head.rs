@@ -18,7 +18,7 @@ use crate::error::RenderError;
 pub const MAX_MELANIN: f32 = 0.5;
 /// Largest hemoglobin fraction of the skin colour table (papers/004 table 7.1).
 pub const MAX_HEMOGLOBIN: f32 = 0.32;
-/// Wrinkle maps that one head can have: a weight each in the channels of four layers.
+/// Wrinkle maps that one head can have: one weight per channel of four layers.
 pub const MAX_WRINKLE_MAPS: usize = 16;
 /// Blend shapes that one head can have.
 pub(crate) const MAX_SHAPES: usize = 1 << 12;
@@ -48,7 +48,7 @@ pub(crate) struct GpuVertex {
     pub(crate) padding: u32,
 }
 
-/// A head that frames can show any number of times.
+/// A head that any number of frames can show.
 pub struct HeadOnGpu {
     pub(crate) point_count: u32,
     pub(crate) vertex_count: u32,
@@ -71,7 +71,7 @@ pub struct HeadOnGpu {
     pub(crate) bounds: (Vec3, Vec3),
     /// Millimetres of skin across the unit square of the texture: the median over its triangles.
     pub(crate) mm_per_texture: f32,
-    /// Where its opaque parts can be.
+    /// Bounds of its opaque parts.
     pub(crate) clusters: Vec<Cluster>,
     /// Bytes of buffers and textures on the device.
     pub memory_bytes: u64,
@@ -192,7 +192,7 @@ impl HeadOnGpu {
     }
 }
 
-/// How large the texture of skin is at rest. Faces have the densest triangles, so their scale counts most.
+/// Scale of the skin's texture at rest. The face has the densest triangles, so its scale dominates the median.
 fn mm_per_texture(head: &Head) -> f32 {
     let mesh = &head.mesh;
     let skin = mesh.parts.iter().filter(|p| p.material == Material::Skin).flat_map(|p| p.triangles.clone());
@@ -343,7 +343,7 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
     let gloss = texels(gloss_size, |u, v| [specular.sample(u, v, 0), specular.sample(u, v, 1), 0.0, 0.0]);
     let slopes = maps.slopes.as_ref().unwrap_or(&flat);
     let slope_size = largest_of([slopes]);
-    // Channel 2 averages the squared slope on the way down, so that each level knows the variance it lost.
+    // Channel 2 averages the squared slope, so that each level contains the variance that it lost.
     let slope_texels = texels(slope_size, |u, v| {
         let (x, y) = (slopes.sample(u, v, 0), slopes.sample(u, v, 1));
         [x, y, 0.5 * (x * x + y * y), 0.0]
@@ -355,7 +355,7 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
         }
     }
     let wrinkle_size = largest_of(&maps.wrinkle_slopes);
-    // The relief as coarse as the wrinkles: what a difference of normals is taken from.
+    // The relief at the resolution of the wrinkles, from which the difference of normals is taken.
     let mask = Mask::full(slopes.width, slopes.height);
     let coarse = if maps.wrinkle_slopes.is_empty() || slopes.width <= wrinkle_size[0] {
         slopes.clone()
@@ -430,7 +430,7 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
     })
 }
 
-/// Texels of an image of this size from a function of texture space.
+/// Evaluates a function of texture space at the texels of an image of this size.
 fn texels(size: [u32; 2], f: impl Fn(f32, f32) -> Texel + Sync) -> Vec<Texel> {
     (0..size[1])
         .into_par_iter()

@@ -8,7 +8,7 @@ use super::placement::bounding_sphere;
 use super::{Environment, Light, LightKind, MAX_LIGHTS, Scene};
 use crate::device::Image;
 
-/// Cosine between the camera's view and the way to a lamp from which the lamp stands behind the heads.
+/// Cosine between the camera's view and the direction to a lamp above which the lamp is behind the heads.
 const BEHIND_COSINE: f32 = 0.4;
 
 /// A light as the shader reads it; the fields are described there.
@@ -88,11 +88,12 @@ pub(crate) struct LightView {
     pub(crate) across: f32,
 }
 
-/// Room around what receives shadows, metres: half the widest search for blockers, and what light crosses in skin.
+/// Room around what receives shadows, metres: half the widest search for blockers, and the distance that light travels
+/// in skin.
 const MARGIN_METRES: f32 = 0.012;
-/// Windows in a doubling of their size.
+/// Steps of window size per doubling.
 const WINDOW_STEPS: f32 = 4.0;
-/// Smallest window as a share of the whole map's width.
+/// Smallest window, as a share of the whole map's width.
 const LEAST_WINDOW: f32 = 1.0 / 32.0;
 /// Windows move by this share of their width: whole texels of any map of a power of two from 64.
 const WINDOW_MOVES: f32 = 1.0 / 64.0;
@@ -126,7 +127,7 @@ impl LightView {
         }
     }
 
-    /// The part of the view that holds spheres, as a square; all of it where that is no smaller.
+    /// The part of the view that holds spheres, as a square; all of it if the square would not be smaller.
     pub(crate) fn narrowed(self, kind: &LightKind, receivers: &[Sphere]) -> Self {
         let is_perspective = kind.position().is_some();
         let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
@@ -165,8 +166,8 @@ impl LightView {
     }
 }
 
-/// The lamps of a scene and, where the environment's light is to pass through thin parts and no lamp with shadows
-/// shines from behind the heads, a dark one there whose shadow map tells how thick they are.
+/// The lamps of a scene and, where the environment's light may pass through thin parts and no lamp with shadows
+/// shines from behind the heads, a lamp without light there, whose shadow map gives their thickness.
 pub(crate) fn lamps(scene: &Scene<'_>, transmits: bool) -> Vec<Light> {
     let mut lamps = scene.lights.to_vec();
     let (center, _) = bounding_sphere(scene);

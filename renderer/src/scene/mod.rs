@@ -1,4 +1,4 @@
-//! What a frame shows: heads, camera, lights, surroundings.
+//! The scene of a frame: heads, camera, lights, environment.
 
 use glam::camera::rh;
 use glam::{Mat4, Vec3};
@@ -33,9 +33,9 @@ pub struct Scene<'a> {
     pub camera: Camera,
     /// At most [`MAX_LIGHTS`].
     pub lights: &'a [Light],
-    /// Light from everywhere; without one only `lights` shine.
+    /// Light from all directions; without it only `lights` shine.
     pub environment: Option<&'a Environment>,
-    /// How far the environment is turned about +Y, radians; positive turns the surroundings to the left of someone who
+    /// Rotation of the environment about +Y, radians; positive turns the surroundings to the left of a viewer who
     /// looks along -Z.
     pub environment_rotation: f32,
     /// Factor of the environment's radiance.
@@ -67,7 +67,7 @@ pub struct Camera {
     pub fov_degrees: f32,
 }
 
-/// Distance of the near plane, metres: a close-up of an eye fits. The far plane is at infinity.
+/// Distance of the near plane, metres: small enough for a close-up of an eye. The far plane is at infinity.
 pub const NEAR_METRES: f32 = 0.01;
 
 impl Camera {
@@ -110,9 +110,9 @@ pub enum LightKind {
         position: Vec3,
         /// From the lamp to the scene, any length above zero.
         direction: Vec3,
-        /// Half angle at which the light is gone, degrees, 0 to 89.
+        /// Half angle at which the light reaches zero, degrees, 0 to 89.
         outer_degrees: f32,
-        /// Half angle inside which it is full, degrees, below `outer_degrees`.
+        /// Half angle within which the light is full, degrees, below `outer_degrees`.
         inner_degrees: f32,
     },
     /// Light in all directions from a place. Its shadow map covers the heads only.

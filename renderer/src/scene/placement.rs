@@ -1,4 +1,4 @@
-//! Where the camera, the heads, the lamps and their shadow maps of a frame stand.
+//! Placement of the camera, the heads, the lamps and their shadow maps in a frame.
 
 use glam::{Mat4, Vec3};
 
@@ -11,8 +11,8 @@ pub(crate) fn world_from_head(instance: &HeadInstance<'_>) -> Mat4 {
         * Mat4::from_rotation_translation(instance.state.head_rotation, instance.state.head_translation)
 }
 
-/// Where the heads are lit for a picture of a size: what the camera sees of them, `margin` times the picture, and what is
-/// turned away where `sees_backs`.
+/// The parts of the heads that are lit for a picture of a size: those in the camera's view, `margin` times as large as
+/// the picture, and those that face away if `sees_backs`.
 pub(crate) fn receivers(scene: &Scene<'_>, size: [u32; 2], margin: f32, sees_backs: bool) -> Vec<Sphere> {
     let [width, height] = size;
     let clip_from_view = scene.camera.clip_from_view(width as f32 / height as f32);

@@ -1,4 +1,4 @@
-//! A head of a scene with its buffers of the moment: what passes are handed.
+//! A head of a scene with its buffers of the frame, as passes receive it.
 
 use glam::Mat4;
 use rubor_rig::face_state::FaceState;
@@ -12,7 +12,7 @@ use crate::device::{Gpu, Image, ImageSpec};
 /// Bytes of the tangent frame of a vertex: normal, occlusion, tangent, sign.
 const FRAME_BYTES: u64 = 32;
 
-/// A head in a state at a place, and what the passes before the view made of it.
+/// A head in a state at a place, with the results of the passes before the view.
 #[derive(Clone, Copy)]
 pub(crate) struct PosedHead<'a> {
     /// Its number in the ids of visible triangles.
@@ -22,9 +22,9 @@ pub(crate) struct PosedHead<'a> {
     pub(crate) world_from_head: Mat4,
     /// Deformed points, world space, metres; w = ambient visibility.
     pub(crate) positions: &'a wgpu::Buffer,
-    /// Those of the previous frame; of this one where there is none.
+    /// Those of the previous frame; those of this frame if there is none.
     pub(crate) previous_positions: &'a wgpu::Buffer,
-    /// Where the positions of this frame are kept for the next one.
+    /// Buffer that keeps the positions of this frame for the next one.
     pub(crate) kept_positions: &'a wgpu::Buffer,
     /// Normal and tangent of each vertex, world space.
     pub(crate) tangent_frames: &'a wgpu::Buffer,
@@ -63,7 +63,7 @@ impl Instance {
         }
     }
 
-    /// Whether a head can use it.
+    /// Whether the buffers fit a head.
     pub(crate) fn fits(&self, head: &HeadOnGpu) -> bool {
         self.positions.size() == (u64::from(head.point_count) * 16).max(16)
             && self.tangent_frames.size() == (u64::from(head.vertex_count) * FRAME_BYTES).max(16)
@@ -81,7 +81,7 @@ fn layers(head: &HeadOnGpu) -> u32 {
     wrinkle_layers(head.maps.as_ref().map_or(0, |m| m.wrinkle_maps))
 }
 
-/// The heads of a scene with their buffers; `has_past` where the previous positions are known.
+/// The heads of a scene with their buffers; `has_past` if the previous positions are known.
 pub(crate) fn posed<'a>(
     scene: &'a Scene<'_>,
     instances: &'a [Instance],

@@ -31,7 +31,7 @@ pub(crate) struct View {
 pub(crate) struct Seen {
     /// The [`View`].
     pub(crate) view: wgpu::Buffer,
-    /// Pixels for a millimetre of the farthest head.
+    /// Pixels per millimetre of the farthest head.
     pub(crate) pixels_per_mm: f64,
     /// r32uint: head << 27 | triangle + 1, 0 = nothing.
     pub(crate) ids: Image,
@@ -68,7 +68,7 @@ pub(crate) fn view(
         near: NEAR_METRES,
         light_count: lamps.len() as u32,
         shading_jitter,
-        // Depths near that of the nearest head are kept best.
+        // Depths near that of the nearest head are the most precise.
         depth_origin_mm: 1000.0 * head_depths(scene, view_from_world).reduce(f32::min).unwrap_or(0.0),
         environment_turn: scene.environment_rotation / (2.0 * std::f32::consts::PI),
     }

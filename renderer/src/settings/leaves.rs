@@ -6,14 +6,14 @@ use serde_json::Value;
 
 use super::{Settings, SettingsError};
 
-/// A setting that is no group of others.
+/// A single setting, as opposed to a group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Leaf {
-    /// Names of the objects that it is in, and its own: `["quality", "shadowSize"]`.
+    /// Names of the objects that contain it, and its own name: `["quality", "shadowSize"]`.
     pub path: [String; 2],
-    /// What it decides.
+    /// Description of the setting.
     pub about: String,
-    /// What may be written there: names of methods, a range, a form.
+    /// The allowed values: names of methods, a range, a form.
     pub expected: String,
     /// Its default.
     pub default: Value,
@@ -46,7 +46,7 @@ impl Leaf {
     /// The JSON value of a text on the command line.
     ///
     /// # Errors
-    /// The text is no value of this setting.
+    /// The text is not a value of this setting.
     pub fn parse(&self, text: &str) -> Result<Value, String> {
         let value = if self.path[1] == "size" {
             parse_size(text)?

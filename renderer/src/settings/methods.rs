@@ -1,6 +1,6 @@
-//! Every method that a frame can be made with, in one table: name, number, stage, summary, source.
+//! Every method of rendering a frame, in one table: name, number, stage, summary, source.
 //!
-//! A row declares the variant of the group's type and everything that is said of it. Parsing, messages, command flags,
+//! A row declares the variant of the group's type and all of its properties. Parsing, messages, command flags,
 //! JSON schemas, the chart, the benchmark, documentation and tests read this table; nothing else names a method.
 //!
 //! ```
@@ -24,30 +24,30 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {
-    /// It does nothing.
+    /// The method does nothing.
     Nowhere,
     /// Before the view is known: maps of the head, light on all of its surface.
     BeforeView,
-    /// While what is seen is lit.
+    /// While the visible surfaces are lit.
     Shading,
     /// On images of the lit surface.
     AfterShading,
     /// On the displayed picture.
     Picture,
-    /// In a frame of its own that is as exact as time allows.
+    /// In a frame of its own, as exact as time allows.
     Reference,
 }
 
-/// The number behind the colon of a method's name.
+/// The number after the colon in a method's name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Number {
     /// Least and largest value.
     pub range: RangeInclusive<u32>,
-    /// Only every `step`th value from the least on.
+    /// Distance between allowed values, counted from the least.
     pub step: u32,
-    /// The value of a name without a number; `None` where the number has to be written.
+    /// The value of a name without a number; `None` if the number must be given.
     pub default: Option<u32>,
-    /// What it counts.
+    /// The quantity that it counts.
     pub counts: &'static str,
 }
 
@@ -58,11 +58,11 @@ pub struct Method {
     pub name: &'static str,
     /// Its number, if it has one.
     pub number: Option<Number>,
-    /// When it works.
+    /// The stage at which it works.
     pub stage: Stage,
-    /// One sentence.
+    /// One sentence that describes it.
     pub summary: &'static str,
-    /// Where it comes from.
+    /// Source: author and year, or chapter.
     pub source: &'static str,
 }
 
@@ -71,21 +71,21 @@ pub struct Method {
 pub struct Group {
     /// Name of the setting and of the flag.
     pub name: &'static str,
-    /// What the methods decide.
+    /// The property that the methods decide.
     pub about: &'static str,
     /// Its methods, the cheapest first.
     pub methods: &'static [Method],
 }
 
-/// A name that the table does not have, or a number out of range.
+/// A name that is not in the table, or a number out of range.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("found {found:?}, expected {expected}{}", .nearest.as_ref().map(|n| format!("; did you mean {n:?}?")).unwrap_or_default())]
 pub struct UnknownMethod {
-    /// What was written.
+    /// The text that was found.
     pub found: String,
-    /// What may be written.
+    /// The texts that are allowed.
     pub expected: String,
-    /// The name that it may have been meant for, with its number.
+    /// The most similar name, with its number.
     pub nearest: Option<String>,
 }
 
@@ -121,7 +121,7 @@ impl Number {
 }
 
 impl Method {
-    /// How it is written: `separable:N (N odd, 5 to 65)`.
+    /// Its syntax: `separable:N (N odd, 5 to 65)`.
     pub fn usage(&self) -> String {
         match &self.number {
             None => self.name.to_owned(),
@@ -130,7 +130,7 @@ impl Method {
         }
     }
 
-    /// A name that can be parsed: with the least number where one has to be written.
+    /// A name that can be parsed: with the least number if one must be given.
     pub fn example(&self) -> String {
         match &self.number {
             Some(n) => format!("{}:{}", self.name, n.default.unwrap_or(*n.range.start())),
@@ -140,7 +140,7 @@ impl Method {
 }
 
 impl Group {
-    /// All that may be written, with ranges.
+    /// Every allowed name, with ranges.
     pub fn usage(&self) -> String {
         let all: Vec<String> = self.methods.iter().map(Method::usage).collect();
         match all.split_last() {
@@ -149,7 +149,7 @@ impl Group {
         }
     }
 
-    /// Row and number of a name.
+    /// Finds the row and the number of a name.
     fn find(&self, text: &str) -> Result<(usize, u32), UnknownMethod> {
         let (name, number) = match text.split_once(':') {
             Some((name, number)) => (name, Some(number)),
@@ -217,7 +217,7 @@ macro_rules! groups {
                     }),*],
                 };
 
-                /// Every method; those with a number have their default or least one.
+                /// Every method; those with a number have their default or least number.
                 pub fn all() -> impl Iterator<Item = Self> {
                     Self::GROUP.methods.iter().filter_map(|m| m.example().parse().ok())
                 }

@@ -40,15 +40,15 @@ pub use profile::DiffusionProfile;
 #[serde(default, deny_unknown_fields, rename_all = "camelCase")]
 #[schemars(title = "rubor settings", inline)]
 pub struct Settings {
-    /// What comes out.
+    /// The output of a frame.
     pub output: Output,
-    /// How well and how fast.
+    /// Quality against speed.
     pub quality: Quality,
     /// How the light becomes a picture.
     pub look: Look,
 }
 
-/// What comes out of a frame.
+/// The output of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields, rename_all = "camelCase")]
 #[schemars(inline)]
@@ -107,17 +107,17 @@ pub struct Look {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
-    /// For trying things out: cheap scattering, small shadow maps, no light through thin parts.
+    /// For trials: cheap scattering, small shadow maps, no light through thin parts.
     Draft,
-    /// For looking at a performance: the default.
+    /// For previewing a performance; the default.
     Review,
-    /// For pictures that are kept: more taps, sixteen samples per pixel.
+    /// For final pictures: more taps, sixteen samples per pixel.
     Final,
     /// As exact as time allows: the integral over the surface.
     Reference,
 }
 
-/// Settings that a frame cannot be made with.
+/// Settings with which no frame can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SettingsError {
     /// A value is outside of its range.
@@ -130,7 +130,7 @@ pub enum SettingsError {
         /// The range.
         expected: String,
     },
-    /// A field or a value has no such name or type.
+    /// A field has an unknown name, or a value has the wrong type.
     #[error("{0}")]
     Json(String),
 }
@@ -178,7 +178,7 @@ impl Preset {
         }
     }
 
-    /// What it chooses.
+    /// The quality that it chooses.
     pub fn quality(self) -> Quality {
         let review = Quality::default();
         match self {
@@ -217,7 +217,7 @@ impl Settings {
         self.output.size.map(|n| n * self.samples_per_side())
     }
 
-    /// Replaces what a JSON object of the same shape names; the rest stays.
+    /// Replaces the settings that a JSON object of the same structure names; the others stay.
     ///
     /// # Errors
     /// An unknown field, a value of the wrong type, an unknown method.
@@ -232,7 +232,7 @@ impl Settings {
     /// Checks every range of the schema.
     ///
     /// # Errors
-    /// Names the first setting out of range.
+    /// The first setting out of range.
     pub fn validate(&self) -> Result<(), SettingsError> {
         self.quality.scatter.validate().map_err(|e| out_of_range("quality.scatter", e))?;
         self.quality.antialias.validate().map_err(|e| out_of_range("quality.antialias", e))?;

@@ -10,7 +10,7 @@ use rubor_rig::skin::profile::Profile;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// How far light goes in skin, for every method. In JSON a name, or a profile as `rubor profile` prints it.
+/// How far light goes in skin, for every method. In JSON it is a name, or a profile as `rubor profile` prints it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DiffusionProfile(Arc<Profile>);
 

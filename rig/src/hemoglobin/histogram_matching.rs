@@ -1,8 +1,8 @@
 //! Exact local histogram matching: the mapping that scale and bias approximate by Gaussians (papers/004 section 7.4).
 //!
-//! For every texel the cumulative histograms of the neutral and of the target map in its disk are kept by sliding:
+//! For every texel the cumulative histograms of the neutral and of the target map in its disk are updated by sliding:
 //! a step along a row adds one edge of the disk and removes the other. Values have 16 bits; the inverse of a tie
-//! is its own level, so matching a map with itself changes nothing. Slow by purpose: it is the oracle.
+//! is its own level, so matching a map with itself changes nothing. Slow on purpose: it is the oracle.
 
 use rayon::prelude::*;
 
@@ -51,7 +51,7 @@ impl Histogram {
         (f64::from(below) + 0.5 * f64::from(self.fine[level as usize])) / f64::from(self.total)
     }
 
-    /// Level at which the cumulative count passes a share of the window.
+    /// Level at which the cumulative count exceeds a share of the window.
     fn level_at(&self, quantile: f64) -> u16 {
         let rank = quantile * f64::from(self.total);
         let mut below = 0u32;
@@ -71,10 +71,10 @@ impl Histogram {
 
 /// Matches the neutral map to the target in the disk of `radius_px` around each texel.
 ///
-/// Texels that either mask leaves out keep the neutral value. Both maps have one size.
+/// Texels outside either mask keep the neutral value. Both maps have the same size.
 ///
 /// # Errors
-/// Maps that are not alike, have other than 1 channel or a mapped value that is not finite; a radius of 0.
+/// Maps of different sizes, with more than 1 channel or with a mapped value that is not finite; a radius of 0.
 pub fn match_locally(
     neutral: &Map,
     target: &Map,

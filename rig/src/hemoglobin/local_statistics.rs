@@ -5,7 +5,7 @@
 //!            --disk = square + 2 caps of rows + 2 caps of columns--> sums of the window --integers--> mean, sigma
 //! ```
 //!
-//! The disk is `|u| <= r` on texel centres. Texels that the mask leaves out, and everything beyond the border, take no
+//! The disk is `|u| <= r` on texel centres. Texels outside the mask and everything beyond the border take no
 //! part. Sums are integers, so they do not depend on the order, and the sum of squares about an integer near the mean
 //! has no cancellation: sigma is right to the fixed point even where it is 10^-4 of the mean, and 0 where the window is constant.
 //!
@@ -13,7 +13,7 @@
 //! are summed row by row (above and below) and column by column (at the sides), two reads each: 0.6 of the reads of
 //! summing all rows of the disk.
 //!
-//! Rows are worked on in bands, columns in blocks that fit the second-level cache: 32 bytes a texel of one band and
+//! Rows are worked on in bands, columns in blocks that fit the second-level cache: 32 bytes per texel of one band and
 //! block per thread.
 
 use rayon::prelude::*;
@@ -65,7 +65,7 @@ pub fn local_statistics(map: &Map, mask: &Mask, radius_px: u32) -> Result<LocalS
         });
     }
     let radius = radius_px as usize;
-    // Half side of the largest square inside the disk; rows and columns beyond it are no longer than it.
+    // Half side of the largest square inside the disk; rows and columns outside the square are no longer than its side.
     let square = (radius * radius / 2).isqrt();
     let caps: Vec<(usize, usize)> = (square + 1..=radius).map(|d| (d, half_width(radius, d))).collect();
     let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
@@ -74,8 +74,8 @@ pub fn local_statistics(map: &Map, mask: &Mask, radius_px: u32) -> Result<LocalS
             (low, high) = (low.min(*v), high.max(*v));
         }
     }
-    // A window's sum of squares must fit 64 bits, and so must its sum beside its count: 25 bits a value up to a radius
-    // of 72 texels, 20 at the largest.
+    // A window's sum of squares must fit 64 bits, and so must its sum beside its count: 25 bits per value up to a
+    // radius of 72 texels, 20 at the largest.
     let side = 2 * square as u64 + 1;
     let window = side * side + caps.iter().map(|(_, w)| 4 * (2 * *w as u64 + 1)).sum::<u64>();
     let window_bits = u64::BITS - window.leading_zeros();
@@ -281,7 +281,7 @@ impl Window<'_> {
     }
 }
 
-/// Adds, for each lane, what a prefix gains over `gap` entries. By value, so that the sums stay in registers.
+/// Adds, for each lane, the increase of a prefix over `gap` entries. By value, so that the sums stay in registers.
 #[inline(always)]
 fn plus(mut total: [u64; LANES], prefix: &[u64], gap: usize) -> [u64; LANES] {
     let before: &[u64; LANES] = prefix.first_chunk().expect("padded rows");
@@ -302,7 +302,7 @@ mod tests {
         random::unit(random::mixed(i as u64 ^ 0x5555))
     }
 
-    /// Equation 7.1 as it stands, in f64 with the mean taken off first.
+    /// Equation 7.1 directly, in f64, with the mean subtracted first.
     fn direct(map: &Map, mask: &Mask, radius: i64, x: i64, y: i64) -> Option<(f64, f64)> {
         let mut values = Vec::new();
         for dy in -radius..=radius {

@@ -8,10 +8,11 @@
 //! histogram_matching: the exact mapping that scale and bias approximate
 //! ```
 //!
-//! Rules where the equations have none:
+//! Rules for cases that the equations leave open:
 //! - `sigma_n = 0`: `scale = (sigma_i + d) / (sigma_n + d)` with `d = 1e-8 mu_n`, at most [`MAX_SCALE`]. Where
 //!   `sigma_n` is 1e-4 of the mean this changes the scale by 1e-4 of itself; where both deviations are 0 it is 1.
-//! - Neutral has the weight that the others leave, and `H` is computed as `H_n` plus differences to neutral:
+//! - The neutral distribution has the weight that the others leave, and `H` is computed as `H_n` plus differences to
+//! neutral:
 //!   algebraically equation 7.6, and neutral weights give `H_n` bit for bit.
 //! - `H` is clamped to 0..[`crate::skin::chromophores::MAX_HEMOGLOBIN`].
 
@@ -27,7 +28,7 @@ use crate::map::Map;
 use crate::mask::{Mask, fill_unmapped, resize_area};
 use crate::skin::chromophores::MAX_HEMOGLOBIN;
 
-/// Largest scale of a distribution: what a window without contrast in the neutral map may be asked to show.
+/// Largest scale of a distribution: limits the contrast asked of a window that has none in the neutral map.
 pub const MAX_SCALE: f32 = 100.0;
 
 /// Regularisation of the scale relative to the neutral mean.
@@ -42,13 +43,13 @@ pub const DISTRIBUTION_SIZE: u32 = 256;
 pub struct HemoglobinError {
     /// Place: a map with a texel, the radius, the weights.
     pub at: String,
-    /// What stands there.
+    /// The value there.
     pub found: String,
-    /// What should.
+    /// The values that are allowed.
     pub expected: String,
 }
 
-/// One channel, the size of the mask, finite where mapped.
+/// Checks that a map has one channel, the size of the mask and finite values where mapped.
 fn check_map(name: &str, map: &Map, mask: &Mask) -> Result<(), HemoglobinError> {
     let fail = |at: String, found: String, expected: String| Err(HemoglobinError { at, found, expected });
     let size = map.width as usize * map.height as usize;
@@ -190,7 +191,7 @@ pub fn blend_texel(
 
 /// Equation 7.6 for a whole map: H at the resolution of the neutral map; scale, bias and mean are sampled bilinearly.
 ///
-/// `weights` has one value a distribution; missing ones count as 0.
+/// `weights` has one value per distribution; missing ones count as 0.
 pub fn blend(
     neutral: &Map,
     neutral_mean: &Map,

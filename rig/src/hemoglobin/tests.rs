@@ -132,7 +132,7 @@ fn exact_matching_of_a_map_with_itself_changes_nothing() {
     assert!(map_difference(&map, &same, &Mask::full(41, 33)).max < 2e-6);
 }
 
-/// Every window sorted anew: the definition that the sliding histograms must agree with.
+/// Sorts every window anew: the definition that the sliding histograms must agree with.
 #[test]
 fn sliding_histograms_agree_with_sorting() {
     let (w, h, r) = (23i64, 19i64, 4i64);

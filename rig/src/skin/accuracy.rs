@@ -8,12 +8,12 @@ use super::monte_carlo::{AlbedoTable, PhotonWalk, RadialError};
 use super::profile::RadialProfile;
 use crate::error::SkinError;
 
-/// Work of an accuracy table.
+/// Number of photons and seeds of an accuracy table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AccuracyOptions {
-    /// Photons of the reference walk of each channel.
+    /// Photons per reference walk of a channel.
     pub reference_photons: u64,
-    /// Photons of the table of all albedos, of each index.
+    /// Photons per table of all albedos, one table for each index of refraction.
     pub table_photons: u64,
     /// Seed of the table; the references use others.
     pub seed: u64,
@@ -28,9 +28,9 @@ impl Default for AccuracyOptions {
 /// Errors of the models for skin1 and skin2 at eta 1.3 and 1.4.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AccuracyTable {
-    /// What it was made with.
+    /// The options that it was made with.
     pub options: AccuracyOptions,
-    /// A row for each medium, index and model.
+    /// One row per medium, index and model.
     pub rows: Vec<AccuracyRow>,
 }
 
@@ -85,7 +85,7 @@ pub fn accuracy_table(options: AccuracyOptions) -> Result<AccuracyTable, SkinErr
     Ok(AccuracyTable { options, rows })
 }
 
-/// Measures all models for R, G and B media of the index of `table`, a row a model.
+/// Measures all models for R, G and B media of the index of `table`, one row per model.
 ///
 /// The references take seeds `seed`, `seed + 1` and `seed + 2`, which must not be the table's.
 pub fn accuracy_rows(

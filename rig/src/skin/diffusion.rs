@@ -1,7 +1,7 @@
 //! Profiles from diffusion theory: dipoles, the slab, normalized diffusion, photon beam diffusion.
 //!
-//! Every model gives R(r) per unit of light that passed the boundary, with the light that is reflected back inside on
-//! its way out already taken off; the reflection on the way in is the specular term's business.
+//! Every model gives R(r) per unit of light that passed the boundary. The light that is reflected back inside on its
+//! way out is already subtracted; reflection on the way in belongs to the specular term.
 
 use std::f64::consts::PI;
 
@@ -155,20 +155,20 @@ as_medium!(StandardDipole, BetterDipole, PhotonBeamDiffusion);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SlabSide {
-    /// The side it entered: reflectance.
+    /// The side where it entered: reflectance.
     Lit,
     /// The other side: transmittance.
     Far,
 }
 
-/// What describes a slab: see [`MultipoleSlab::new`].
+/// Parameters of a slab: see [`MultipoleSlab::new`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SlabShape {
-    /// What the slab is made of.
+    /// Medium of the slab.
     pub medium: Medium,
     /// Thickness, mm.
     pub thickness_mm: f64,
-    /// Which side the profile is of.
+    /// The side that the profile describes.
     pub side: SlabSide,
 }
 
@@ -204,7 +204,7 @@ impl MultipoleSlab {
         2.0 * (self.shape.thickness_mm + 2.0 * self.z_b)
     }
 
-    /// Sums `f(z_+) - f(z_-)` over the pole pairs that matter out to `r_mm`, farthest first.
+    /// Sums `f(z_+) - f(z_-)` over the pole pairs that contribute out to `r_mm`, farthest first.
     fn poles(&self, r_mm: f64, f: impl Fn(f64) -> f64) -> f64 {
         let pairs = (40.0 * r_mm / self.period()).ceil().clamp(60.0, 4000.0);
         let pair = |j: i32| {
@@ -222,7 +222,7 @@ impl MultipoleSlab {
         rest + (1..=last).rev().map(|j| pair(j) + pair(-j)).sum::<f64>() + pair(0)
     }
 
-    /// R(r) or T(r), mm^-2. Far out the alternating series can end a rounding error below zero; that is cut.
+    /// R(r) or T(r), mm^-2. Far out the alternating series can fall below zero by rounding; it is clamped to 0.
     pub fn reflectance(&self, r_mm: f64) -> f64 {
         let sum = self.poles(r_mm, |z| z * flux(self.sigma_tr, r_mm.hypot(z)));
         (self.shape.medium.albedo() * sum).max(0.0)
@@ -422,7 +422,7 @@ pub struct PhotonBeamDiffusion {
 }
 
 impl PhotonBeamDiffusion {
-    /// The profile of a valid medium that absorbs (without absorption the table would have no end).
+    /// The profile of a valid medium that absorbs (without absorption the table would be infinite).
     pub fn new(medium: Medium) -> Result<Self, SkinError> {
         let dipole = BetterDipole::new(medium)?;
         if medium.albedo() > 0.99999 {

@@ -18,7 +18,7 @@ use crate::error::SkinError;
 /// Terms that a fit may have.
 pub const TERMS: std::ops::RangeInclusive<usize> = 1..=12;
 
-/// What a fit minimises.
+/// The error that a fit minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Emphasis {
@@ -126,7 +126,7 @@ pub fn fit_channel_exponentials(
     Ok((sum, fit.errors[0]))
 }
 
-/// Normalized diffusion with the profile's total and the width that puts the least light in the wrong place.
+/// Normalized diffusion with the profile's total and the width that misplaces the least light.
 ///
 /// The published widths were fitted to index-matched media; this is the refit for any other. Also returns the fraction
 /// of misplaced light, by 120 rings.
@@ -146,7 +146,7 @@ pub fn refit_normalized_diffusion(profile: &RadialProfile) -> Result<(Normalized
         let rings = (0..NODES).map(|i| (light[i] - light[i + 1] - aim[i] + aim[i + 1]).abs());
         rings.sum::<f64>() / total
     };
-    // Golden section: the sum has one valley in the width of a one-parameter family.
+    // Golden section: the error has one minimum in the width of a one-parameter family.
     let ratio = 0.5 * (5f64.sqrt() - 1.0);
     let (mut a, mut b) = (middle.ln() - 3.0, middle.ln() + 3.0);
     while b - a > 1e-6 {
@@ -163,15 +163,15 @@ pub fn refit_normalized_diffusion(profile: &RadialProfile) -> Result<(Normalized
 
 struct Fit {
     lengths: Vec<f64>,
-    /// By channel, then term.
+    /// Indexed by channel, then term.
     weights: Vec<Vec<f64>>,
     errors: Vec<FitError>,
 }
 
-/// Radii at which a fit looks.
+/// Radii at which a fit is evaluated.
 const NODES: usize = 120;
 
-/// Weight of the row that ties the sum of the weights to the total, relative to the norm of a channel's rows.
+/// Weight of the row that constrains the sum of the weights to the total, relative to the norm of a channel's rows.
 const SUM_ROW: f64 = 100.0;
 
 /// A channel at the nodes.
@@ -219,10 +219,10 @@ fn fit(channels: &[RadialProfile], k: usize, basis: Basis, emphasis: Emphasis) -
         DVector::from_iterator(NODES * parts.len(), parts.iter().flat_map(|p| p.iter().copied()))
     };
     let bounds = vec![(low.ln() - 1.0, high.ln()); k];
-    // Several starts: the valley has as many arms as terms can trade places.
+    // Several starts: exchanging terms gives as many local minima.
     let mut starts = vec![from_dictionary(&targets, &radii, k, basis)];
     for (u_low, u_high) in [(0.02, 0.995), (0.1, 0.97)] {
-        // Quantiles of the light to lengths that put it there.
+        // Converts quantiles of the light to lengths.
         let reach = if basis == Basis::Gaussian { 1.1 } else { 1.6 };
         let a = quantile(u_low, f64::min, f64::INFINITY).ln();
         let b = quantile(u_high, f64::max, 0.0).ln() - reach;
@@ -235,7 +235,7 @@ fn fit(channels: &[RadialProfile], k: usize, basis: Basis, emphasis: Emphasis) -
             best = found;
         }
     }
-    // A term that lost its weight has no slope to follow back: the lengths are shaken and searched again.
+    // A term of weight 0 has no gradient: the lengths are perturbed and searched again.
     for shake in [0.3, -0.3, 0.8] {
         let shaken = best.0.iter().enumerate();
         let start: Vec<f64> = shaken.map(|(i, l)| if i % 2 == 0 { l + shake } else { l - shake }).collect();
@@ -281,7 +281,7 @@ fn from_dictionary(targets: &[Target], radii: &[f64], k: usize, basis: Basis) ->
         logs.iter().copied().zip(used).filter(|&(_, weight)| weight > 1e-4).collect();
     while clusters.len() > k {
         let merged = |a: (f64, f64), b: (f64, f64)| ((a.0 * a.1 + b.0 * b.1) / (a.1 + b.1), a.1 + b.1);
-        // The pair whose merger moves the least weight the least.
+        // The pair whose merger moves the least weight over the least distance.
         let cost = |w: &[(f64, f64)]| (w[1].0 - w[0].0).powi(2) * w[0].1 * w[1].1 / (w[0].1 + w[1].1);
         let pair = clusters.windows(2).enumerate().min_by(|a, b| cost(a.1).total_cmp(&cost(b.1)));
         let Some((i, _)) = pair else { break };
@@ -299,7 +299,7 @@ fn from_dictionary(targets: &[Target], radii: &[f64], k: usize, basis: Basis) ->
     result
 }
 
-/// Best weights for given lengths, and what is left over.
+/// Best weights for given lengths, and the residual.
 fn project(target: &Target, radii: &[f64], lengths: &[f64], basis: Basis) -> (DVector<f64>, DVector<f64>) {
     let columns =
         DMatrix::from_fn(NODES, lengths.len(), |i, j| target.rows[i] * basis.value(lengths[j], radii[i]));
@@ -308,7 +308,7 @@ fn project(target: &Target, radii: &[f64], lengths: &[f64], basis: Basis) -> (DV
     let normal = columns.tr_mul(&columns).add_scalar(tie * tie);
     let right = columns.tr_mul(&aim).add_scalar(tie * tie * target.total);
     let mut weights = non_negative_least_squares(&normal, &right);
-    // The tie leaves about a part in 10^4; the sum is to be exact.
+    // The constraint row leaves an error of about 10^-4; the sum has to be exact.
     let sum = weights.sum();
     if sum > 0.0 {
         weights *= target.total / sum;

@@ -1,4 +1,4 @@
-//! Sums of Gaussians: the profiles that separate.
+//! Sums of Gaussians: the separable profiles.
 
 use std::f64::consts::PI;
 

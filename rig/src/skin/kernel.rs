@@ -24,14 +24,14 @@ pub const SAMPLES: std::ops::RangeInclusive<usize> = 5..=65;
 
 /// Fraction of the light of the widest channel that lies inside of a kernel's half width.
 ///
-/// The rest is folded into the taps; a larger fraction spends taps on light that nobody sees.
+/// The rest is folded into the taps; a larger fraction spends taps on invisible light.
 const COVERAGE: f64 = 0.99;
 
-/// How a kernel is made from a profile.
+/// Method by which a kernel is made from a profile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum KernelMethod {
-    /// Least squares over straight edges of light in all directions; what frames use.
+    /// Least squares over straight edges of light in all directions; the method of frames.
     Edges,
     /// The profile's line spread function: exact for light that varies along one axis, as across an upright shadow, and
     /// farthest off across a diagonal one, where the product of two line spreads is wider than the profile.
@@ -52,11 +52,11 @@ pub struct SeparableKernel {
     pub weights: Vec<[f64; 3]>,
 }
 
-/// The artist's handles (Jimenez 2012, eq. 6.1): `s(x) = p(x / a) strength + delta(x) (1 - strength)`.
+/// The artist's parameters (Jimenez 2012, eq. 6.1): `s(x) = p(x / a) strength + delta(x) (1 - strength)`.
 ///
-/// p is d'Eon's red channel without its narrowest Gaussian, whose light the delta stands for, as it is in units of a
-/// millimetre. The kernel's half width is three such units, so `a = (0.001 + falloff) width_mm / 3`: a falloff of 1 and a
-/// width of 3 mm are d'Eon's own red.
+/// p is d'Eon's red channel without its narrowest Gaussian; the delta stands for the light of that Gaussian, and p uses
+/// units of a millimetre. The kernel's half width is three such units, so `a = (0.001 + falloff) width_mm / 3`: a
+/// falloff of 1 and a width of 3 mm give d'Eon's own red.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArtistKernel {
     /// Half width of the kernel, mm.
@@ -67,7 +67,7 @@ pub struct ArtistKernel {
     pub falloff: [f64; 3],
 }
 
-/// A kernel, how it was made and how far it is from the profile.
+/// A kernel, its method and its distance from the profile.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KernelReport {
     /// Name of the profile.
@@ -113,7 +113,7 @@ impl SeparableKernel {
         self.offsets_mm.last().copied().unwrap_or(0.0)
     }
 
-    /// From the weights of the centre and the taps on one side; makes each channel sum to one.
+    /// Makes a kernel from the weights of the centre and the taps on one side; makes each channel sum to one.
     fn mirrored(grid: &Grid, half: [Vec<f64>; 3]) -> Self {
         let last = grid.half.len() - 1;
         let sums = half.each_ref().map(|w| w[0] + 2.0 * w[1..].iter().sum::<f64>());
@@ -208,7 +208,7 @@ fn slice_cdf(x: f64) -> f64 {
 
 /// Fits strength and falloff of each channel to the exact kernel by eq. 6.3.
 ///
-/// The samples are the taps' cells: as dense near the centre as the taps are, each with the light that it holds.
+/// The samples are the taps' cells, which are as dense near the centre as the taps, each with its light.
 fn fit_artist(grid: &Grid, exact: &[DMatrix<f64>; 3]) -> ArtistKernel {
     let width_mm = grid.width_mm();
     let mut artist = ArtistKernel { width_mm, strength: [0.0; 3], falloff: [0.0; 3] };
@@ -219,7 +219,7 @@ fn fit_artist(grid: &Grid, exact: &[DMatrix<f64>; 3]) -> ArtistKernel {
             let difference = (exact - grid.separable_quadrant(&half)) / norm;
             DVector::from_column_slice(difference.as_slice())
         };
-        // The falloff in steps of a factor is the part with several valleys.
+        // The falloff, the part with several minima, is searched in steps of a constant factor.
         let (low, high) = ((0.001 * width_mm / 3.0f64).ln(), (4.0 * width_mm / 3.0f64).ln());
         let mut best = (vec![low, 0.5], f64::INFINITY);
         for i in 0..8 {
@@ -240,13 +240,13 @@ fn line_spread(profile: &Profile, grid: &Grid) -> SeparableKernel {
     SeparableKernel::mirrored(grid, half)
 }
 
-/// Waves of the edges of [`edges`], from this over the half width on, evenly in the logarithm, and their directions
-/// from an axis to the diagonal.
+/// Wave numbers of the edges of [`edges`], from this over the half width on, evenly spaced in the logarithm, and their
+/// directions from an axis to the diagonal.
 const LONGEST_WAVE: f64 = 0.2;
 const SHORTEST_WAVE: f64 = 43.0;
 const WAVES: usize = 60;
 const DIRECTIONS: usize = 10;
-/// Pull of each weight towards the line spread, where edges do not tell it from its neighbours.
+/// Regularisation of each weight towards the line spread, where edges do not separate it from its neighbours.
 const PULL: f64 = 0.1;
 
 /// The kernel that blurs straight edges of light, of all directions alike, as the profile does: the spectrum of a
@@ -267,7 +267,7 @@ fn edges(profile: &Profile, grid: &Grid) -> SeparableKernel {
             LONGEST_WAVE / width * (SHORTEST_WAVE / LONGEST_WAVE).powf(t)
         };
         let truth: Vec<f64> = (0..WAVES).map(|i| spectrum(places, &light, wave(i))).collect();
-        // Power 1 / k^2 over steps of k in proportion to k.
+        // Power 1 / k^2, integrated over steps of k proportional to k.
         let share: Vec<f64> = (0..WAVES).map(|i| wave(i).powf(-0.5)).collect();
         let norm = (DIRECTIONS as f64 * share.iter().map(|s| s * s).sum::<f64>()).sqrt();
         let taps = grid.half.len() - 1;
@@ -278,7 +278,7 @@ fn edges(profile: &Profile, grid: &Grid) -> SeparableKernel {
             })
         };
         let (along, across) = (cosines(f64::cos), cosines(f64::sin));
-        // With the centre as what is left to one, a line's spectrum is 1 + sum of w (2 cos - 2).
+        // The centre's weight is one minus the others, so a line's spectrum is 1 + sum of w (2 cos - 2).
         let residual = |weights: &[f64]| {
             let w = DVector::from_column_slice(weights);
             let (a, b) = (&along * &w, &across * &w);

@@ -1,4 +1,4 @@
-//! Scattering media and their boundary.
+//! Scattering media and their boundaries.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ pub struct Medium {
 impl Medium {
     /// Checks the coefficients: finite, not negative, scattering above zero, eta inside of [`ETA`].
     ///
-    /// A medium that does not scatter returns no light and has no profile; one that does not absorb is fine for
+    /// A medium that does not scatter returns no light and has no profile; one that does not absorb is valid for
     /// the dipoles and the slab (they total one, or conserve energy) and an error for a photon walk.
     pub fn new(sigma_s_prime_per_mm: f64, sigma_a_per_mm: f64, eta: f64) -> Result<Self, SkinError> {
         let medium = Self { sigma_s_prime_per_mm, sigma_a_per_mm, eta };
@@ -98,7 +98,7 @@ pub fn fresnel_from_inside(mu: f64, eta: f64) -> f64 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// What a diffusion model needs of the boundary, from exact moments of the Fresnel reflectance.
+/// Boundary terms of a diffusion model, from exact moments of the Fresnel reflectance.
 ///
 /// `C1` and `C2` are the integrals of `F mu` and `F mu^2` over `mu` in 0..1 (d'Eon and Irving 2011).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,4 +1,4 @@
-//! Light in skin: how far it travels before it comes out again.
+//! Light in skin: how far it travels before it leaves.
 //!
 //! ```text
 //! Medium (sigma_s', sigma_a, eta) --> dipoles, multipole, photon beam diffusion --+

@@ -15,7 +15,7 @@ use super::monte_carlo::AlbedoTable;
 use super::profile::{Profile, RadialProfile};
 use crate::error::SkinError;
 
-/// How a profile follows from a medium.
+/// A way to compute a profile from a medium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ProfileModel {
@@ -63,7 +63,8 @@ impl ProfileModel {
         Self::MonteCarlo,
     ];
 
-    // `strum` would write this table and `ALL`, but not the message with the nearest name: too little for a crate.
+    // `strum` would write this table and `ALL`, but not the message with the nearest name: too little to justify a
+    // crate.
     /// The name in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {

@@ -31,24 +31,24 @@ const BATCHES: u64 = 64;
 /// infinite.
 pub const MAX_ALBEDO: f64 = 0.9999;
 
-/// How a photon that meets the surface is counted.
+/// How photons that meet the surface are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// When it leaves. Unbiased by construction; the check of the other.
+    /// When it leaves. Unbiased by construction; checks the other estimator.
     Analog,
     /// On each upward flight by the probability that it leaves on that flight. Same mean, less noise.
     Expected,
 }
 
-/// Rings of equal width in `ln r`: the singular centre and the tail get as many as the middle.
+/// Rings of equal width in `ln r`: the singular centre and the tail get as many rings as the middle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rings {
     /// Outer radius of the innermost ring (a disk), mean free paths.
     pub inner: f64,
     /// Radius outside of which photons are only counted, mean free paths.
     pub outer: f64,
-    /// Rings for a tenfold radius.
+    /// Rings per decade of radius.
     pub per_decade: u32,
 }
 
@@ -70,7 +70,7 @@ impl Rings {
     }
 }
 
-/// What to walk.
+/// Parameters of a walk.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhotonWalk {
     /// Mean cosine g of the Henyey-Greenstein phase function; 0 for a reduced medium.
@@ -81,7 +81,7 @@ pub struct PhotonWalk {
     pub albedos: Vec<f64>,
     /// Number of photons (rounded up to a multiple of 64).
     pub photons: u64,
-    /// Streams of random numbers follow from it.
+    /// Seed of the random streams.
     pub seed: u64,
     /// How photons are counted.
     pub estimator: Estimator,
@@ -92,7 +92,7 @@ pub struct PhotonWalk {
 /// Light by ring, in mean free paths.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WalkResult {
-    /// What was walked.
+    /// The parameters of the walk.
     pub walk: PhotonWalk,
     /// Edges of the rings, mean free paths, from 0.
     pub edges: Vec<f64>,
@@ -138,7 +138,7 @@ impl PhotonWalk {
             return Err(SkinError::new(
                 "walk.rings",
                 format!("{rings:?}"),
-                "0 < inner < outer and 1 to 1000 rings a decade",
+                "0 < inner < outer and 1 to 1000 rings per decade",
             ));
         }
         Ok(())
@@ -215,7 +215,7 @@ impl PhotonWalk {
                             }
                             return;
                         }
-                        // Reflected: what is left of the flight goes down again.
+                        // Reflected: the rest of the flight goes down again.
                         (x, y, z) = (exit_x, exit_y, 0.0);
                         w = -w;
                         flight -= way_out;
@@ -231,7 +231,7 @@ impl PhotonWalk {
                 *weight *= albedo;
                 heaviest = heaviest.max(*weight);
             }
-            // Russian roulette on the heaviest: the rest follow it down and gain with it.
+            // Russian roulette by the largest weight: all weights die or are scaled with it.
             if heaviest < 0.1 {
                 let survival = 0.25;
                 if random.uniform() >= survival {
@@ -351,7 +351,7 @@ pub struct RadialError {
     pub noise: f64,
 }
 
-/// Profiles of every albedo, for one anisotropy and one index: a walk to keep.
+/// Profiles of every albedo, for one anisotropy and one index: a walk that can be stored.
 ///
 /// The light of a ring over the albedo is interpolated by a polynomial in `x = sqrt(1 - albedo)` through Chebyshev
 /// nodes, in the logarithm. In x it is smooth: Chandrasekhar's exact solution for the total is `1 - x H(1)`, and tails
@@ -424,7 +424,7 @@ fn chebyshev_nodes() -> [f64; ALBEDO_NODES] {
 }
 
 impl AlbedoTable {
-    /// The walk, with the albedos of the nodes.
+    /// The walk, for the albedos of the nodes.
     pub fn result(&self) -> &WalkResult {
         &self.result
     }
@@ -479,7 +479,7 @@ impl AlbedoTable {
         let light: Vec<f64> = (0..=rings)
             .map(|j| {
                 let nodes = &self.result.ring_light;
-                // A ring that some node never saw ends the table.
+                // The table ends at the first ring that is empty at some node.
                 if nodes.iter().any(|node| node[j] <= 0.0) {
                     return 0.0;
                 }
@@ -512,8 +512,8 @@ fn interpolation(albedo: f64) -> [f64; ALBEDO_NODES] {
     raw.map(|w| w / sum)
 }
 
-/// xoshiro256++ (Blackman and Vigna 2019), seeded through [`SplitMix64`]: kept walks hold its sequence, and its period
-/// of 2^256 leaves every batch a stream of its own.
+/// xoshiro256++ (Blackman and Vigna 2019), seeded through [`SplitMix64`]: stored walks depend on its sequence, and its
+/// period of 2^256 leaves every batch a stream of its own.
 struct Random {
     state: [u64; 4],
 }

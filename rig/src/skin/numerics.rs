@@ -125,7 +125,7 @@ pub(crate) fn non_negative_least_squares(normal: &DMatrix<f64>, right: &DVector<
     let mut x = DVector::zeros(n);
     let mut free = vec![false; n];
     let tolerance = 1e-12 * right.amax();
-    // Each round frees one column; more than three rounds a column is cycling on rounding.
+    // Each round frees one column; more than three rounds per column mean a cycle caused by rounding.
     for _ in 0..3 * n {
         let gradient = right - normal * &x;
         let candidate = (0..n).filter(|&i| !free[i]).max_by(|&a, &b| gradient[a].total_cmp(&gradient[b]));
@@ -162,7 +162,7 @@ pub(crate) fn non_negative_least_squares(normal: &DMatrix<f64>, right: &DVector<
                 }
             }
             if set.iter().all(|&i| free[i]) {
-                // Rounding kept every column: stop instead of looping.
+                // Rounding kept every column: stop, or the loop would not end.
                 return x;
             }
         }

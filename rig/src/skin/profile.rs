@@ -72,12 +72,12 @@ impl RadialProfile {
         self.mass_beyond(0.0)
     }
 
-    /// Integral of R outside of a disk of radius `r_mm`; closed form as the total is.
+    /// Integral of R outside of a disk of radius `r_mm`; in closed form where the total is.
     pub fn mass_beyond(&self, r_mm: f64) -> f64 {
         each!(self, p => p.mass_beyond(r_mm))
     }
 
-    /// A radius inside of the profile, where numerical searches start.
+    /// A typical radius of the profile, where numerical searches start.
     pub(crate) fn scale_mm(&self) -> f64 {
         match self {
             Self::Gaussians(p) => p.terms()[0].variance_mm2.sqrt(),
@@ -133,7 +133,7 @@ impl RadialProfile {
 
     /// Integral of `mass_beyond(x / cos phi)` for phi from 0 to `atan(slope_max)`.
     ///
-    /// `cos phi = 1 / cosh u` spreads the end near a right angle, where the radius runs through all scales.
+    /// `cos phi = 1 / cosh u` spreads the samples near a right angle, where the radius covers all scales.
     fn wedge_beyond(&self, x_mm: f64, slope_max: f64) -> f64 {
         // Beyond u = 36 the remaining angle is below the last bit of the result.
         let end = slope_max.asinh().min(36.0);

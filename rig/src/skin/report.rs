@@ -1,4 +1,4 @@
-//! What a report on a profile holds.
+//! The report on a profile.
 
 use serde::{Deserialize, Serialize};
 

@@ -8,7 +8,7 @@ use crate::error::SkinError;
 
 /// A positive function of the radius, a power law between its points, so that its integral is exact.
 ///
-/// Inside of the first point the first power law goes on (a pencil beam gives `1/r`); outside of the last it is 0.
+/// Inside of the first point the first power law continues (a pencil beam gives `1/r`); outside of the last it is 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Points", into = "Points")]
 pub struct RadialTable {
@@ -97,9 +97,9 @@ impl RadialTable {
     /// A table with these integrals over rings: `edges_mm` has one entry more than `masses`.
     ///
     /// Points stand at the logarithmic middles. The mean over a ring is not the value at its middle where the
-    /// profile curves, so the values are corrected until the rings of the table hold what was asked.
+    /// profile curves, so the values are corrected until the rings of the table hold the given integrals.
     pub(crate) fn from_rings(edges_mm: &[f64], masses: &[f64]) -> Result<Self, SkinError> {
-        // Few photons leave rings empty; those join the next one outside, and at the end the last one.
+        // Few photons leave rings empty; those are merged into the next one outside, at the end into the last one.
         let (mut edges, mut merged) = (vec![edges_mm[0]], Vec::new());
         let mut pending = 0.0;
         for (edge, mass) in edges_mm[1..].iter().zip(masses) {

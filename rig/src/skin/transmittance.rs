@@ -8,7 +8,7 @@ use crate::error::SkinError;
 
 /// Light through a slab over its thickness, R, G, B, at even steps from 0 to `thickness_max_mm`.
 ///
-/// Scaled so that the profile's total is 1: albedo is the surface's, as it is for reflectance.
+/// Scaled so that the profile's total is 1: the albedo comes from the surface, as for reflectance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TransmittanceTable {
     /// Thickness of the last entry, mm.

@@ -25,7 +25,7 @@ pub struct Filter<'a> {
     ready: Option<Ready>,
 }
 
-/// What images of one size and format need.
+/// Resources for images of one size and format.
 struct Ready {
     size: [u32; 2],
     pass: Antialias,
@@ -59,7 +59,7 @@ impl<'a> Filter<'a> {
         self.read(|ready| &ready.output).await
     }
 
-    /// Filters floats. Not a number must not occur.
+    /// Filters floats, which must not be NaN.
     ///
     /// # Errors
     /// An empty or too large image, a wrong number of pixels, or the device failed.

@@ -5,7 +5,7 @@
 //!        |
 //!      edges -----> edge bits (rows and columns), list of tiles with edges, copy of the colour (1x)
 //!        |
-//!     weights ----> four weights a pixel with edges              <-- coverage (lookups)
+//!     weights ----> four weights per pixel with edges            <-- coverage (lookups)
 //!        |
 //!   1x:  blend ---> the pixels beside edges, over the copy
 //!   S2x, T2x, 4x:
@@ -13,14 +13,14 @@
 //! ```
 //!
 //! # Theory and source
-//! Edges of an aliased image are stairs. Each line of edges is followed to both ends; what crosses it there tells
-//! which straight contour it stands for, and the area between contour and edges is the share that pixels take of
-//! their neighbours. J. Jimenez, *Practical real-time strategies for photorealistic skin rendering and
+//! Edges of an aliased image are stairs. Each line of edges is followed to both ends; the crossing edges there tell
+//! which straight contour it stands for; the area between contour and edges is the weight with which pixels take
+//! the colour of their neighbours. J. Jimenez, *Practical real-time strategies for photorealistic skin rendering and
 //! antialiasing*, 2012, chapter 9 (MLAA) and 10 (SMAA), equations 9.1, 9.2 and 10.1 to 10.7. Presets, searched
 //! distances, subsample offsets and the treatment of ties follow the published SMAA.
 //!
 //! # What differs
-//! - Edges are bits, 32 pixels a word, in rows and again in columns. A search reads two or three words and counts
+//! - Edges are bits, 32 pixels per word, in rows and again in columns. A search reads two or three words and counts
 //!   zeros, where the published one fetches and decodes a texture every second pixel. The result is the same
 //!   (tests compare both), and no search texture is read.
 //! - Coverage comes from a table for whole distances (see [`lookups`]): one read, no square root, no filtering.
@@ -30,7 +30,7 @@
 //!   kernel copies the image on its way, so that 1x reads and writes every pixel once.
 //! - Contrast is compared in whole 1/65535 steps of luma, so ties do not depend on rounding. Alpha is a channel of its
 //!   own in edge detection, and straight alpha weighs blended colours.
-//! - Diagonals are stairs that a straight line can have left, found in the same way at top and at left edges and
+//! - Diagonals are stairs that a straight line can have produced, found in the same way at top and at left edges and
 //!   mirrored ([`Patterns::Revised`], which lists the other differences). The published shader finds them at top
 //!   edges, also where both ends turn the same way, as on circles; [`Patterns::Published`] does the same.
 //! - Colour edges compare neighbours at a distance of one pixel throughout; the published shader compares with the
@@ -40,18 +40,19 @@
 //! - MLAA finds exact distances, where that of chapter 9 may be one pixel off.
 //! - T2x and 4x keep speed apart from alpha and filter the speed itself, not its square root; a previous position
 //!   outside of the image counts as unknown. A pixel moves as the fastest of it and its neighbours, as on outlines the
-//!   two samples see different things, and speeds are compared in pixels, not in parts of the image.
+//!   two samples see different surfaces, and speeds are compared in pixels, not in parts of the image.
 //!
 //! # Inputs and outputs
 //! - Colours: any texture that loads as `f32`, one for each of [`Mode::subsamples`], encoded as
-//!   [`Settings::encoding`] says (sRGB by default), with alpha as [`Settings::alpha`] says (straight by default). Not a number must not occur.
+//!   [`Settings::encoding`] says (sRGB by default), with alpha as [`Settings::alpha`] says (straight by default). NaN
+//! must not occur.
 //! - Depth, where [`Settings::needs_depth`]: one for each sample, any monotonic scale.
 //! - Velocity for T2x and 4x: motion since the previous frame in pixels, x right, y down, without jitter; `rg`.
 //! - Output: a storage texture of the format given to [`Antialias::new`], encoded like the input.
 //!
 //! # What it does not do
-//! It draws no samples and moves no camera: [`Mode::subsamples`] says where samples belong. It cannot restore what no
-//! sample saw; thin wires break at 1x.
+//! It draws no samples and moves no camera: [`Mode::subsamples`] gives the sample positions. It cannot restore detail
+//! that no sample hit; thin wires break at 1x.
 //!
 //! # Cost
 //! See `docs/antialiasing.md` for times and memory, with devices.
@@ -78,19 +79,19 @@ use crate::passes::pixel_groups;
 
 /// K of equation 10.6: how fast the previous frame fades with the difference of speeds.
 pub const REPROJECTION_WEIGHT: f32 = 30.0;
-/// Pixels a frame that are a speed of 1 in equation 10.6: the width that its K was published for. A trail is as many
-/// pixels long in an image of any size.
+/// Pixels per frame of a speed of 1 in equation 10.6: the width that its K was published for. A trail has the same
+/// length in pixels in images of every size.
 pub const SPEED_UNIT_PX: f32 = 1280.0;
 
-/// Pixels a side of the tiles that are listed where they have edges; the width of a word of edge bits.
+/// Pixels per side of the tiles that are listed where they have edges; the width of a word of edge bits.
 const TILE: u32 = 32;
 /// Workgroups that share the listed tiles, at most: as many as a large GPU holds at once. They are dispatched directly,
-/// since an indirect dispatch waits for its count and has it checked by another dispatch.
+/// since an indirect dispatch waits for its count and is validated by another dispatch.
 const MOST_WORKGROUPS: u32 = 2048;
 /// Relative rounding of the half floats that the history is stored in.
 const HISTORY_PRECISION: f32 = 1.0 / 1024.0;
 
-/// Parameters of every kernel; the layout is that of `Params` in `shared.wgsl`.
+/// Parameters of every kernel; the layout is that of `Params` in `shared.wesl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 struct Params {
@@ -109,7 +110,7 @@ struct Params {
     falling_in_columns: u32,
 }
 
-/// How pixels are handed to the device in 1x and MLAA. The result is the same.
+/// How pixels are distributed to invocations in 1x and MLAA. The result is the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Dispatch {
     /// Tiles with edges, and in them the pixels with edges.
@@ -132,7 +133,7 @@ pub struct Inputs<'a> {
     pub frame: u64,
 }
 
-/// What T2x and 4x remember: the filtered light and speed of the previous frame.
+/// The history of T2x and 4x: the filtered light and speed of the previous frame.
 pub struct History {
     size: [u32; 2],
     light: [TextureView; 2],
@@ -156,7 +157,7 @@ impl History {
         }
     }
 
-    /// Forgets the previous frame: call it at a cut. The next frame is not mixed with anything.
+    /// Clears the history, for a cut: the next frame is not mixed with a previous one.
     pub fn invalidate(&mut self) {
         self.valid = false;
     }
@@ -167,7 +168,7 @@ impl History {
     }
 }
 
-/// What one sample needs between its kernels.
+/// Intermediate images of one sample.
 struct Sample {
     bits: wgpu::Buffer,
     tiles: wgpu::Buffer,
@@ -181,7 +182,7 @@ pub struct Antialias {
     dispatch: Dispatch,
     size: [u32; 2],
     samples: Vec<Sample>,
-    /// For each of two frames, for each sample.
+    /// Indexed by frame parity, then by sample.
     params: [Vec<wgpu::Buffer>; 2],
     params_with_history: wgpu::Buffer,
     areas: wgpu::Buffer,
@@ -243,7 +244,7 @@ impl Antialias {
         };
 
         let samples = settings.mode.subsamples(0).len();
-        // Only these can do without a resolve over the whole image.
+        // Only these modes do not need a resolve over the whole image.
         let simple = samples == 1 && !settings.mode.is_temporal();
         let dispatch = if simple { dispatch } else { Dispatch::Tiles };
         let by_tiles = simple && dispatch == Dispatch::Tiles;
@@ -340,10 +341,11 @@ impl Antialias {
 
     /// Records the kernels of one frame.
     ///
-    /// A history of another size is made anew, so that after a change of size one frame is not mixed with anything.
+    /// A history of another size is replaced, so the first frame after a change of size is not mixed with a previous
+    /// one.
     ///
     /// # Errors
-    /// Inputs that the settings ask for are missing. Nothing was recorded then.
+    /// Inputs that the settings need are missing; nothing is recorded.
     pub fn record(
         &self,
         gpu: &Gpu,
@@ -524,8 +526,8 @@ impl Step {
         Kernel::new(gpu, label, &program, entry)
     }
 
-    /// The shader of the kernel for some settings, and its entry point. Choices are constants, so that the compiler drops
-    /// what is not used.
+    /// The shader of the kernel for some settings, and its entry point. Settings are constants, so that the compiler
+    /// drops unused code.
     fn program(
         self,
         settings: &Settings,

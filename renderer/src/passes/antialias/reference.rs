@@ -1,6 +1,6 @@
 //! The pass on the CPU, from the equations: edges as plain booleans, one pixel at a time.
 //!
-//! The image is continued by its border pixels, so outside of it there are no new edges and lines run on.
+//! The image is continued by its border pixels, so there are no new edges outside of it and lines continue.
 
 use super::lookups::{AreaTable, DIAGONAL_SLOT};
 use super::settings::{
@@ -62,13 +62,14 @@ pub fn linear_from_srgb(stored: f32) -> f32 {
     if stored <= 0.040_45 { stored.max(0.0) / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Steps of colour which edge detection counts in. Integers make the comparison of contrasts exact, with the
+/// Steps of colour in which edge detection counts. Integers make the comparison of contrasts exact, with the
 /// same result on every processor; values that come from 8 or 16 bits are hit without rounding.
 pub(super) const STEPS: f32 = 65535.0;
 /// Colours over this many times white all count as this bright, far over the range of displays.
 pub(super) const BRIGHTEST: f32 = 1000.0;
 
-/// What of a colour makes an edge, in [`STEPS`]. Alpha counts too: a black shape on nothing has an edge.
+/// The values of a colour that edge detection compares, in [`STEPS`]. Alpha counts too: a black shape on nothing has an
+/// edge.
 fn feature(color: [f32; 4], settings: &Settings) -> [i32; 4] {
     let encoded = match settings.encoding {
         Encoding::Srgb => color,
@@ -96,7 +97,7 @@ pub(super) fn threshold_steps(threshold: f32) -> i32 {
 /// Edge detection, section 9.3 and equation 10.1.
 ///
 /// # Panics
-/// When settings need depth and there is none.
+/// The settings need depth and there is none.
 pub fn detect_edges(picture: &Picture, depth: Option<&[f32]>, settings: &Settings) -> Edges {
     let (width, height) = (picture.width, picture.height);
     let features: Vec<[i32; 4]> = picture.pixels.par_iter().map(|&color| feature(color, settings)).collect();
@@ -150,7 +151,7 @@ pub fn detect_edges(picture: &Picture, depth: Option<&[f32]>, settings: &Setting
     Edges { width, height, top, left }
 }
 
-/// Edges seen from a line that runs along x; turned, columns become rows.
+/// Edges seen from a line that runs along x; transposed, columns become rows.
 struct Lines<'a> {
     edges: &'a Edges,
     turned: bool,
@@ -182,11 +183,11 @@ impl Lines<'_> {
         u32::from(self.crossing(x, y - 1)) | u32::from(self.crossing(x, y)) << 1
     }
 
-    /// Whether something ends a line between (x - 1, y) and (x, y).
+    /// Whether a crossing edge ends a line between (x - 1, y) and (x, y).
     fn is_crossed(&self, x: isize, y: isize, stop: Stop) -> bool {
         match (stop, self.crossing_code(x, y)) {
             (Stop::Never, _) | (_, 0) => false,
-            // Where contours cross, this one runs on; but not where two pixels of a thin shape touch.
+            // Where contours cross, this one continues, except where two pixels of a thin shape touch.
             (Stop::AtTurns, 3) => !self.crossing(x, y - 2) && !self.crossing(x, y + 1),
             _ => true,
         }
@@ -213,12 +214,12 @@ impl Lines<'_> {
     }
 }
 
-/// What ends a line of edges, beside its last edge.
+/// What ends a line of edges, besides its last edge.
 #[derive(Clone, Copy)]
 enum Stop {
-    /// Nothing: chapter 9.
+    /// Nothing else: chapter 9.
     Never,
-    /// Crossing edges on any side: as published.
+    /// Crossing edges on any side, as in the published shader.
     AtCrossings,
     /// Crossing edges, but not those of another contour that crosses this one.
     AtTurns,
@@ -286,8 +287,8 @@ struct Edge {
     is_level: bool,
 }
 
-/// Weights of the stair through the upper border of (x, y) that rises to the right, or falls, if a straight line left
-/// it ([`Patterns::Revised`]).
+/// Weights of the stair through the upper border of (x, y) that rises to the right, or falls, if a straight line can
+/// have produced it ([`Patterns::Revised`]).
 fn stair_weights(
     lines: &Lines,
     (x, y): (isize, isize),
@@ -477,7 +478,7 @@ pub fn blending_weights(
 }
 
 /// Sum of colours with shares that add up to one. Straight alpha weighs colours; where all are invisible they
-/// count alike.
+/// count equally.
 fn mix(parts: &[(f32, [f32; 4])], settings: &Settings) -> [f32; 4] {
     let decode = settings.encoding == Encoding::Srgb && settings.blend_space == BlendSpace::Linear;
     let alpha: f32 = parts.iter().map(|(share, color)| share * color[3]).sum();
@@ -500,7 +501,7 @@ fn mix(parts: &[(f32, [f32; 4])], settings: &Settings) -> [f32; 4] {
     mixed
 }
 
-/// The last step: each pixel takes its share of its neighbours (equation 9.1).
+/// The last step: each pixel is mixed with its neighbours (equation 9.1).
 pub fn blend(picture: &Picture, weights: &[Weights], settings: &Settings) -> Picture {
     let (width, height) = (picture.width, picture.height);
     let weight = |x: usize, y: usize, channel: usize| {
@@ -539,7 +540,7 @@ pub fn blend(picture: &Picture, weights: &[Weights], settings: &Settings) -> Pic
 /// One sample of a frame, filtered for its place in the pixel.
 ///
 /// # Panics
-/// When settings need depth and there is none.
+/// The settings need depth and there is none.
 pub fn filter_sample(
     picture: &Picture,
     depth: Option<&[f32]>,
@@ -558,7 +559,7 @@ pub fn filter_sample(
 /// All samples of a frame, filtered and averaged in light.
 ///
 /// # Panics
-/// Without pictures, or when settings need depth and there is none.
+/// There are no pictures, or the settings need depth and there is none.
 pub fn filter_samples(pictures: &[Picture], frame: u64, tables: &Tables, settings: &Settings) -> Picture {
     let filtered: Vec<Picture> = pictures
         .iter()
@@ -571,7 +572,7 @@ pub fn filter_samples(pictures: &[Picture], frame: u64, tables: &Tables, setting
 /// Mean of pictures of the same size, in light.
 ///
 /// # Panics
-/// Without pictures.
+/// There are no pictures.
 pub fn average(pictures: &[Picture], settings: &Settings) -> Picture {
     let share = 1.0 / pictures.len() as f32;
     let pixels = (0..pictures[0].pixels.len())
@@ -583,7 +584,7 @@ pub fn average(pictures: &[Picture], settings: &Settings) -> Picture {
     Picture { pixels, ..pictures[0] }
 }
 
-/// Share of the previous frame (equation 10.6) for speeds in units of [`super::SPEED_UNIT_PX`] a frame.
+/// Share of the previous frame (equation 10.6) for speeds in units of [`super::SPEED_UNIT_PX`] per frame.
 pub fn history_share(speed: f32, previous_speed: f32) -> f32 {
     0.5 * (1.0 - super::REPROJECTION_WEIGHT * (speed - previous_speed).abs().sqrt()).max(0.0)
 }

@@ -1,4 +1,4 @@
-//! What to antialias by: modes, presets and every single setting.
+//! Settings of antialiasing: modes, presets and every single setting.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,21 +14,21 @@ pub enum Mode {
     None,
     /// Practical morphological antialiasing (chapter 9).
     Mlaa,
-    /// One sample a pixel.
+    /// One sample per pixel.
     #[default]
     Smaa1x,
-    /// Two samples a pixel, each filtered for its own place in the pixel.
+    /// Two samples per pixel, each filtered for its own place in the pixel.
     SmaaS2x,
-    /// One sample a pixel at alternating places and the reprojected previous frame.
+    /// One sample per pixel at alternating places and the reprojected previous frame.
     SmaaT2x,
-    /// Two samples a pixel at alternating places and the reprojected previous frame.
+    /// Two samples per pixel at alternating places and the reprojected previous frame.
     Smaa4x,
 }
 
-/// One image sample of a frame: where in the pixel it is taken and which coverage belongs there.
+/// One image sample of a frame: its position in the pixel and the coverage blocks for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Subsample {
-    /// Place relative to the pixel's centre in pixels, x to the right, y **down**. A camera reaches it by moving
+    /// Place relative to the pixel's centre in pixels, x to the right, y **down**. A camera samples it by moving
     /// the projected image by the negative of it.
     pub position_px: [f32; 2],
     /// Blocks of the area texture: for left edges, for top edges, for diagonals that rise to the right and for
@@ -108,20 +108,20 @@ impl From<AntialiasMethod> for Mode {
     }
 }
 
-/// Where edges come from.
+/// Source of edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum EdgeSource {
     /// Luma of the encoded colour (equation 9.2): fast and mostly right.
     #[default]
     Luma,
-    /// The channel which differs most: finds edges between colours of equal luma.
+    /// The channel that differs most: finds edges between colours of equal luma.
     Color,
     /// Depth: finds no edges in shading, and creases only where depth jumps.
     Depth,
 }
 
-/// How the image's colours are stored.
+/// Encoding of the image's colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum Encoding {
@@ -139,15 +139,15 @@ pub enum BlendSpace {
     /// Proportional to light: coverage is a fraction of light, so this is right.
     #[default]
     Linear,
-    /// The values as stored: for comparisons with programs that do so.
+    /// The values as stored: for comparisons with programs that blend in this space.
     Stored,
 }
 
-/// What alpha means for the colours beside it.
+/// Relation of the colours to alpha.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub enum Alpha {
-    /// Colours are as they would be at full cover (PNG).
+    /// Colours are not multiplied by alpha (PNG).
     #[default]
     Straight,
     /// Colours are already multiplied by alpha (EXR, renderers).
@@ -171,13 +171,13 @@ impl Default for Predication {
     }
 }
 
-/// Everything that decides what the pass does.
+/// All settings of the pass.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Settings {
     /// The method.
     pub mode: Mode,
-    /// Where edges come from.
+    /// Source of edges.
     pub edges: EdgeSource,
     /// Smallest difference that is an edge, in encoded colour, over 0 up to 0.5. Lower finds more edges.
     pub threshold: f32,
@@ -185,19 +185,19 @@ pub struct Settings {
     pub depth_threshold: f32,
     /// Half the distance in pixels to which ends of lines are searched, 1 to 112. (One step is two pixels.)
     pub search_steps: u32,
-    /// Steps to which ends of diagonals are searched, 0 (no diagonals) to 19.
+    /// Largest number of steps searched along diagonals, 0 (no diagonals) to 19.
     pub diagonal_steps: u32,
-    /// Which contours patterns of edges stand for.
+    /// How patterns of edges are turned into contours.
     pub patterns: Patterns,
     /// How much corners are rounded in percent, 0 (kept sharp) to 100 (like any line).
     pub corner_rounding: u32,
     /// Depth lowers the threshold of colour edges.
     pub predication: Option<Predication>,
-    /// How the colours are stored.
+    /// Encoding of the colours.
     pub encoding: Encoding,
-    /// What alpha means.
+    /// Relation of the colours to alpha.
     pub alpha: Alpha,
-    /// Where neighbours are mixed.
+    /// Space in which neighbours are mixed.
     pub blend_space: BlendSpace,
 }
 
@@ -220,11 +220,12 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The settings of a preset. Of MLAA only the threshold follows the preset; it searches 8 pixels, as far as
-    /// its table goes.
+    /// The settings of a preset. For MLAA the preset sets only the threshold; MLAA searches 8 pixels, the range of
+    /// its table.
     ///
-    /// Presets are those published, but for corners at 1x: keeping them sharp needs to know where they are, and one
-    /// sample does not. On letters in all directions the error at 1x is 0.162 with corners rounded by a quarter and
+    /// Presets are the published ones, except for corners at 1x: keeping them sharp needs their positions, which one
+    /// sample does not give. On letters in all directions the error at 1x is 0.162 with corners rounded by a quarter
+    /// and
     /// 0.142 with corners like any line; with two samples it is 0.116 and 0.129 (`docs/antialiasing.md`).
     pub fn new(mode: Mode, preset: Preset) -> Self {
         let (threshold, search_steps, diagonal_steps, corner_rounding) = match preset {
@@ -254,7 +255,7 @@ impl Settings {
         }
     }
 
-    /// A preset with all that the published SMAA does, for comparisons with it: corners, patterns.
+    /// A preset with the corners and patterns of the published SMAA, for comparisons.
     pub fn published(mode: Mode, preset: Preset) -> Self {
         let sharp = !matches!((mode, preset), (Mode::Mlaa, _) | (_, Preset::Low | Preset::Medium));
         Self {
@@ -267,7 +268,7 @@ impl Settings {
     /// Checks ranges.
     ///
     /// # Errors
-    /// Names the first setting out of range, what it is and what it may be.
+    /// The first setting out of range, with its value and its range.
     pub fn validate(&self) -> Result<(), super::AntialiasError> {
         let check = |name: &'static str, found: f32, range: std::ops::RangeInclusive<f32>| {
             if range.contains(&found) {

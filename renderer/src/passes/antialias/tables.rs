@@ -1,4 +1,4 @@
-//! The coverage that a mode needs, and where its subsamples find theirs.
+//! The coverage tables of a mode, and the blocks of each subsample.
 
 use super::lookups::{AreaTable, OPPOSITE_DIAGONAL_OFFSET, area_texture, mlaa_area_texture};
 use super::settings::{Mode, Patterns, Settings, Subsample};
@@ -37,8 +37,8 @@ impl Tables {
         Self { areas, orthogonal_blocks, diagonal_blocks }
     }
 
-    /// Places in `areas` of the blocks of a subsample of the same mode, in the same order; last that of diagonals
-    /// that fall to the right as seen from columns, where the sample lies on their other side.
+    /// Places in `areas` of the blocks of a subsample of the same mode, in the same order; the last block is that of
+    /// diagonals that fall to the right as seen from columns, where the sample lies on their other side.
     pub fn positions(&self, subsample: &Subsample) -> [usize; 5] {
         let place = |blocks: &[usize], block| blocks.iter().position(|&b| b == block).unwrap_or(0);
         let [left, top, rising, falling] = subsample.blocks;

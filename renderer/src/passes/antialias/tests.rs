@@ -101,7 +101,7 @@ fn mlaa_kernels_equal_the_reference() {
 
 #[test]
 fn smaa_kernels_equal_the_reference() {
-    // One and two words a line, a whole word, and lines of one pixel.
+    // One and two words per line, a whole word, and lines of one pixel.
     let sizes = [(27, 51), (70, 33), (32, 64), (1, 40), (40, 1), (1, 1)];
     assert_kernels_equal_the_reference(&sizes, Settings::new(Mode::Smaa1x, Preset::Ultra));
 }
@@ -313,7 +313,7 @@ impl Frames {
     }
 }
 
-/// A grey disk of radius 9.3 px at (x, y) before a dark ground.
+/// A grey disk of radius 9.3 px at (x, y) in front of a dark background.
 fn disk(x: f64, y: f64) -> impl Fn(f64, f64) -> f32 + Sync {
     move |px, py| if (px - x).hypot(py - y) < 9.3 { 0.8 } else { 0.1 }
 }
@@ -432,7 +432,7 @@ fn outlines_of_what_moves_take_half_of_the_previous_frame() {
     let tables = Tables::new(&settings);
     let mut frames =
         Frames::new(gpu, settings, size.map(|s| s as u32), TextureFormat::Rgba32Float, Dispatch::Tiles);
-    // A whole number of pixels a frame: in its own frame of reference the disk stands still.
+    // A whole number of pixels per frame: in its own frame of reference the disk stands still.
     let scene = |frame: u64| disk(17.3 + 2.0 * frame as f64, 24.1);
     for frame in 0..6 {
         let position = settings.mode.subsamples(frame)[0].position_px;
@@ -450,7 +450,7 @@ fn outlines_of_what_moves_take_half_of_the_previous_frame() {
             for (i, (a, b)) in found.pixels.iter().zip(&expected.pixels).enumerate() {
                 let (x, y) = ((i % size[0]) as f64 + 0.5, (i / size[0]) as f64 + 0.5);
                 let distance = (x - 17.3 - 2.0 * frame as f64).hypot(y - 24.1) - 9.3;
-                // Further out only one of the samples may have the disk next to the pixel, and history is refused.
+                // Further out only one of the samples may have the disk next to the pixel, so the history is rejected.
                 if distance.abs() > 0.7 {
                     continue;
                 }
@@ -500,7 +500,7 @@ fn more_samples_come_closer_to_coverage() {
 
 #[test]
 fn turned_and_mirrored_images_give_turned_and_mirrored_results() {
-    // A disk and stairs of all slopes; counted are pixels changed by the filter.
+    // A disk and stairs of all slopes; the test counts pixels that the filter changes.
     let size = 64usize;
     let mut scenes: Vec<Box<Scene>> = vec![Box::new(disk(31.7, 32.4))];
     for degrees in (0..90).step_by(5) {
@@ -541,7 +541,7 @@ fn turned_and_mirrored_images_give_turned_and_mirrored_results() {
 
 #[test]
 fn searches_equal_those_with_the_search_texture() {
-    // The published search on one line: bilinear fetches of two rows, two pixels a step, decoded by the texture.
+    // The published search on one line: bilinear fetches of two rows, two pixels per step, decoded by the texture.
     let table = lookups::search_texture_uncropped();
     let mut noise = Noise(9);
     for _ in 0..2000 {

@@ -1,8 +1,8 @@
-//! Colour and wrinkles of the moment: hemoglobin distributions and wrinkle zones summed by their weights.
+//! Colour and wrinkles of a frame: hemoglobin distributions and wrinkle zones summed by their weights.
 //!
 //! ```text
 //! bias_i - mu_n, scale_i - 1, weights --+--appearance--> blood    (change of bias, change of scale, mu_n)
-//! zone masks, weights ------------------+              > wrinkles (weight of each wrinkle map, 0 to 1; four a layer)
+//! zone masks, weights ------------------+              > wrinkles (weight of each wrinkle map, 0 to 1; four per layer)
 //! ```
 //!
 //! Theory: papers/004 eq. 7.6 and section 8.2. Eq. 7.6 is written as changes of the neutral,
@@ -10,7 +10,7 @@
 //! sum to one with the neutral and gives the neutral map exactly when all weights are zero.
 //!
 //! Differs from the thesis: the sums are taken once for each of the 256 x 256 low-resolution texels instead of once
-//! a pixel, so a pixel pays two fetches however many distributions and zones there are.
+//! per pixel, so a pixel costs two fetches for any number of distributions and zones.
 //!
 //! Does not: clamp hemoglobin to its physical range (that needs `H_n`: see `shade`).
 

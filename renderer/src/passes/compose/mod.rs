@@ -1,4 +1,5 @@
-//! Puts the picture together: scattered diffuse light times albedo, plus what was not scattered, over the background.
+//! Puts the picture together: scattered diffuse light times albedo, plus light that was not scattered, over the
+//! background.
 //!
 //! ```text
 //! scattered, albedo, direct, depth --compose--> hdr (linear Rec. 709 radiance; a = coverage)

@@ -1,7 +1,7 @@
 use super::*;
 use crate::testing::{gpu, half_image, read_image, recorded};
 
-/// What the pass writes, from its definition.
+/// The expected output of the pass, from its definition.
 fn composed(
     scattered: [f32; 4],
     albedo: [f32; 4],

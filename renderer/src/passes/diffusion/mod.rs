@@ -1,13 +1,13 @@
 //! How light scatters in skin: a closed set of methods with hooks by stage.
 //!
 //! ```text
-//! needs --------> what the frame prepares: backs of the heads, a margin around the picture, transmittance
+//! needs --------> inputs that the frame prepares: backs of the heads, a margin around the picture, transmittance
 //! before_view --> maps of a head, light on all of its surface
 //! after_shading -> diffuse radiance from images of the lit surface
 //! ```
 //!
 //! The frame calls the stages and knows no method. A method is a folder here, a row in [`crate::settings::methods`] and
-//! its line in [`method`], which the compiler asks for.
+//! an arm of the `match` in [`method`], which the compiler enforces.
 
 pub(crate) mod screen;
 pub(crate) mod surface;
@@ -24,14 +24,14 @@ use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
 use crate::settings::ScatterMethod;
 
-/// What a method asks of the frame.
+/// Requirements of a method on the frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Needs {
-    /// Whether light on what faces away from the camera counts.
+    /// Whether it needs light on surfaces that face away from the camera.
     pub(crate) backs: bool,
-    /// Size of the picture with the surroundings whose light counts, over its own.
+    /// Size of the picture including the margin whose light is needed, relative to the picture.
     pub(crate) margin: f32,
-    /// Whether light through thin parts is to be added; methods whose integral holds it do not.
+    /// Whether transmittance has to be added; methods whose integral includes it do not need it.
     pub(crate) transmittance: bool,
 }
 
@@ -41,14 +41,14 @@ impl Default for Needs {
     }
 }
 
-/// A method that draws a frame in one go. Every hook may be left out.
+/// A method that draws a frame in one go. Every hook is optional.
 pub(crate) trait Diffusion {
     /// What it asks of the frame.
     fn needs(&self) -> Needs {
         Needs::default()
     }
 
-    /// Work that no view is needed for: maps of the heads, light on all of their surface.
+    /// Work that does not depend on the view: maps of the heads, light on all of their surface.
     fn before_view(&mut self, _r: &mut Recorder<'_>, _heads: &[PosedHead<'_>], _light: &Illumination<'_>) {}
 
     /// Diffuse radiance of a white surface from images of its light.
@@ -57,12 +57,12 @@ pub(crate) trait Diffusion {
     }
 }
 
-/// Light leaves skin where it enters.
+/// No scattering: light leaves skin where it enters.
 struct Unscattered;
 
 impl Diffusion for Unscattered {}
 
-/// A method with its pipelines and kernels for a profile; nothing for one that needs a frame of its own.
+/// A method with its pipelines and kernels for a profile; `None` for a method that needs a frame of its own.
 ///
 /// # Errors
 /// Its number is out of range, or the profile cannot be fitted.
@@ -91,7 +91,7 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    /// Makes a method for a profile, unless it is there.
+    /// Makes a method for a profile, unless it exists.
     ///
     /// # Errors
     /// As [`method`].

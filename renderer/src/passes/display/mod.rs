@@ -1,4 +1,4 @@
-//! From radiance to the picture that a person sees.
+//! From radiance to the displayed picture.
 //!
 //! ```text
 //! hdr --display--> image (rgba8unorm, sRGB transfer, opaque)
@@ -40,14 +40,14 @@ impl Display {
         Self { kernel: Kernel::new(gpu, "display", &program(tone_map), "display") }
     }
 
-    /// What a display shows of a radiance.
+    /// Converts radiance to display values.
     pub(crate) fn record(&self, r: &mut Recorder<'_>, look: &Look, hdr: &Image) -> Image {
         let image = r.image("displayed", ImageSpec::storage(hdr.size(), wgpu::TextureFormat::Rgba8Unorm));
         self.record_into(r, look, hdr, image.view());
         image
     }
 
-    /// The same into an image of the same size.
+    /// The same, into a given image of the same size.
     pub(crate) fn record_into(
         &self,
         r: &mut Recorder<'_>,

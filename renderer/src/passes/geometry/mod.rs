@@ -1,4 +1,4 @@
-//! Where the surface is: deformed points, tangent frames, what lights and camera see of it, how it moves.
+//! The surface: deformed points, tangent frames, visibility from lights and camera, motion.
 
 pub(crate) mod morph;
 pub(crate) mod shadow;

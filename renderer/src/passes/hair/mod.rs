@@ -1,4 +1,4 @@
-//! What is blended over the composed picture: hairs, lashes, brows and wet films, and the light of a hair.
+//! Passes that blend over the composed picture: hairs, lashes, brows and wet films; and the light of a hair.
 
 pub(crate) mod cropped_hair;
 pub(crate) mod fibre;
@@ -39,7 +39,7 @@ impl Blended {
     }
 }
 
-/// What blended triangles are drawn to: a picture, its motion if it has one, and depth that is only tested.
+/// Targets of blended triangles: a picture, its motion if it has one, and depth that is only tested.
 fn drawn_over<'a>(hdr: &'a Image, velocity: Option<&'a Image>, depth: &'a Image) -> Attachments<'a> {
     let images = std::iter::once(hdr).chain(velocity);
     Attachments {

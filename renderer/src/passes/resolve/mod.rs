@@ -1,15 +1,15 @@
-//! Supersampling: samples x samples pixels of the frame to one of the picture, still as radiance.
+//! Supersampling: averages samples x samples pixels of the frame into one pixel of the picture, as radiance.
 //!
 //! ```text
 //! hdr (samples x samples pixels each) --resolve--> hdr (linear Rec. 709 radiance; a = coverage)
 //! ```
 //!
-//! Theory: a bright highlight must not swallow the edge that it stands on, so the mean is taken of what a display shows
-//! (B. Karis 2013, "Tone mapping" of samples) and brought back through the inverse of the tone map. Lens and display then
+//! Theory: a bright highlight must not swallow the edge that it stands on, so the mean is taken of display values
+//! (B. Karis 2013, "Tone mapping" of samples) and converted back by the inverse of the tone map. Lens and display then
 //! work at the size of the picture, and the displayed value is the mean of the samples' displayed values but for the
 //! rounding of a half float.
 //!
-//! Costs nothing where there is one sample: the pass does not run.
+//! Costs nothing with one sample: the pass does not run.
 
 #[cfg(test)]
 mod tests;
@@ -46,7 +46,7 @@ impl Resolve {
         Self { kernel: Kernel::new(gpu, "resolve", &program(tone_map), "resolve_samples") }
     }
 
-    /// One pixel for `samples` x `samples`; the image itself where that is one.
+    /// One pixel for `samples` x `samples`; the image itself where `samples` is one.
     pub(crate) fn record(&self, r: &mut Recorder<'_>, look: &Look, samples: u32, hdr: Image) -> Image {
         if samples == 1 {
             return hdr;

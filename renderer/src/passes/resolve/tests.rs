@@ -11,7 +11,7 @@ fn display_light(x: f64) -> f64 {
 #[test]
 fn the_mean_is_that_of_what_a_display_shows() {
     let Some(gpu) = gpu() else { return };
-    // Pairs of a dark and an ever brighter sample, two pixels wide and high each.
+    // Pairs of a dark and an increasingly bright sample, each two pixels wide and high.
     let bright: Vec<f32> = (0..16).map(|i| 0.004 * 2f32.powi(i - 2)).collect();
     let size = [2 * bright.len() as u32, 2];
     let texels: Vec<[f32; 4]> = (0..2)

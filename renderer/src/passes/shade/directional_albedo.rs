@@ -1,4 +1,4 @@
-//! Share of an even environment that the specular lobe reflects: what the prefiltered map is multiplied with.
+//! Share of a uniform environment that the specular lobe reflects: the factor of the prefiltered map.
 //!
 //! `A(m, cos) = integral of D(m) F(f0) / |L + V|^2 cos(L) dL = f0 scale + bias`, with the lobe of the lamps (Kelemen and
 //! Szirmay-Kalos 2001 with Beckmann's D and Schlick's F), so a sky and many lamps in its place give the same light.
@@ -8,7 +8,7 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
-/// Cosines of the viewer along a row and roughnesses down; the first and last stand at 0 and 1.
+/// Columns (cosines of the viewer) and rows (roughnesses); the first and the last are at 0 and 1.
 const SIDE: u32 = 32;
 /// Columns of the table before the mean, for the shader.
 pub(crate) const COSINES: u32 = SIDE;
@@ -16,10 +16,10 @@ pub(crate) const COSINES: u32 = SIDE;
 pub(crate) const SIZE: [u32; 2] = [SIDE + 1, SIDE];
 /// Samples along and around the lobe.
 const SAMPLES: [u32; 2] = [24, 24];
-/// Least square of |L + V|: where both graze, the lobe would leave any bound.
+/// Smallest square of |L + V|: the lobe would be unbounded where both graze.
 pub(crate) const LEAST_SQUARE: f32 = 0.3;
 
-/// Factor of f0 and what is added to it.
+/// Factor of f0, and the term added to it.
 pub(crate) fn scale_and_bias(roughness: f32, cosine: f32) -> [f32; 2] {
     let m2 = (roughness * roughness).max(1e-4);
     let cosine = cosine.clamp(0.01, 1.0);
@@ -88,7 +88,8 @@ fn mean(of_cosines: &[[f32; 4]]) -> [f32; 4] {
     sum
 }
 
-/// What enters skin from a lamp at a cosine over what enters of an even sky, for tests: the factor of shade.wesl.
+/// Light of a lamp at a cosine that enters skin, relative to that of a uniform sky, for tests: the factor of
+/// shade.wesl.
 #[cfg(test)]
 pub(crate) fn entering(specular: f32, roughness: f32, cosine: f32) -> f64 {
     let rho = |cosine: f32| {
@@ -146,11 +147,11 @@ mod tests {
         for lobes in [[1.0, 1.0, 0.0], [0.72, 1.5, 0.278]] {
             for row in table(lobes).chunks(SIZE[0] as usize) {
                 for pair in [0, 2] {
-                    // Of skin, f0 = 0.028: the lobe alone is not bounded by one at grazing angles.
+                    // For skin, f0 = 0.028: the lobe alone is not bounded by one at grazing angles.
                     let albedo = |texel: &[f32; 4]| 0.028 * texel[pair] + texel[pair + 1];
                     assert!(row.iter().all(|t| (0.0..=1.0).contains(&albedo(t))), "{row:?}");
                     let [.., mean] = row else { panic!("no columns") };
-                    // The share of an even sky that enters, lamp by lamp, is that of the mean.
+                    // The share of a uniform sky that enters, summed lamp by lamp, is that of the mean.
                     let n = 4000;
                     let entering: f64 = (0..n)
                         .map(|i| {

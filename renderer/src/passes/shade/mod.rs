@@ -1,10 +1,10 @@
-//! Light on what is seen: one compute dispatch a head over the visibility buffer.
+//! Light on the visible surfaces: one compute dispatch per head over the visibility buffer.
 //!
 //! ```text
 //! id, positions, frames, maps, blood, wrinkles, shadows, environment, lights
 //!     --shade--> irradiance (diffuse radiance of a white surface; a = scattering strength)
 //!              > albedo     (linear Rec. 709)
-//!              > direct     (specular, and all of what does not scatter)
+//!              > direct     (specular, and all light of materials that do not scatter)
 //! ```
 //!
 //! Theory: barycentrics and their screen derivatives from ray-plane volumes (exact under perspective); wrinkles as
@@ -12,41 +12,41 @@
 //! Szirmay-Kalos specular with the Beckmann distribution (papers/002, papers/004); percentage-closer soft shadows;
 //! order-2 spherical harmonics and a prefiltered map for the environment; multiple-bounce ambient occlusion.
 //!
-//! The diffuse light of a lamp enters after the specular lobe took its share, and leaves towards the viewer likewise
-//! (Kelemen and Szirmay-Kalos 2001, eq. 10 and 11; d'Eon and Luebke 2007, rho_dt). The albedo of skin is the reflectance
-//! under an even sky seen from in front, without the surface's own reflection (`docs/color.md`), so
+//! The diffuse light of a lamp enters after the specular lobe has taken its share, and leaves towards the viewer in the
+//! same way (Kelemen and Szirmay-Kalos 2001, eq. 10 and 11; d'Eon and Luebke 2007, rho_dt). The albedo of skin is the
+//! reflectance under a uniform sky seen from the front, without the surface's own reflection (`docs/color.md`), so
 //!
 //! ```text
 //! f = albedo / pi (1 - rho(L)) (1 - rho(V)) / ((1 - mean rho) (1 - rho(normal)))
 //! ```
 //!
-//! with rho of `directional_albedo`; the factor of V goes with the albedo, as scattering comes before it. Under an even
-//! sky diffuse and specular light add up to rho(V) + albedo (1 - rho(V)) / (1 - rho(normal)), which is no more than 1 where the
-//! albedo leaves room for rho(normal).
+//! with rho of `directional_albedo`; the factor of V goes with the albedo, as scattering comes before it. Under a
+//! uniform sky diffuse and specular light add up to rho(V) + albedo (1 - rho(V)) / (1 - rho(normal)), which is no more
+//! than 1 where the albedo is at most 1 - rho(normal).
 //!
 //! Specular occlusion: the share of the lobe inside the cone of ambient visibility, which leans towards the viewer
 //! (`specular_visibility`; `docs/occlusion.md`); for the environment and for lamps without a shadow map.
 //!
-//! Highlights of skin may have two lobes ([`SpecularMethod`]): D is their mix, so energy is that of the mix of tables.
+//! Highlights of skin may have two lobes ([`SpecularMethod`]): D is their weighted mean, so the table is the same mean.
 //!
-//! Differs from the sources: slope variance that minification hides widens the Beckmann lobe (Toksvig 2005), and so
+//! Differs from the sources: slope variance lost by minification widens the Beckmann lobe (Toksvig 2005), and so
 //! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
 //!
 //! Transmittance (papers/004 ch. 5): light through thin parts from shadow maps and T(s), added to the diffuse light that
-//! is scattered next. Differs from the source: it sums the profile over what the light shines on around its ray, the
-//! integral of eq. 5.8 with the surface that the shadow map holds, so tilt, thickness and the edges of thin parts need
-//! no guess (no reversed normal, no 0.3 wrap, no shrinking); what the camera sees is left to `scatter`. Lamps without
-//! shadows transmit nothing. For the environment, which has no shadow map, a lamp behind the surface tells the
+//! is scattered next. Differs from the source: it sums the profile over the lit surface around the light's ray, the
+//! integral of eq. 5.8 with the surface in the shadow map, so tilt, thickness and the edges of thin parts need
+//! no guess (no reversed normal, no 0.3 wrap, no shrinking); light on the visible surface is left to `diffusion`. Lamps
+//! without shadows transmit nothing. For the environment, which has no shadow map, a lamp behind the surface gives the
 //! thickness; where none shines from behind the head, `scene::lamp::lamps` places a dark one there.
 //!
-//! Eyes, teeth and the lining of the mouth scatter light too, but not in `scatter`, whose profile is that of skin: their
-//! shadows are means over a disc as wide as light spreads in them (`spread_shadow`; the spread is about one over the
-//! reduced scattering coefficient: Bashkatov et al. 2010 for sclera, Fried et al. 1995 for enamel and dentine), which is
-//! all that a slab a few millimetres thick shows of it. How near lids and lips are is measured along the picture, so what
-//! they hide from outside its border does not darken.
+//! Eyes, teeth and the lining of the mouth scatter light too, but not in `diffusion`, whose profile is that of skin:
+//! their shadows are means over a disc as wide as light spreads in them (`spread_shadow`; the spread is about one over
+//! the reduced scattering coefficient: Bashkatov et al. 2010 for sclera, Fried et al. 1995 for enamel and dentine),
+//! which is the visible effect in a slab a few millimetres thick. The distance to lids and lips is measured in the
+//! picture, so what lies outside its border does not darken.
 //!
 //! Tears along the lower lid are a strip whose normal turns from the ball to the lid, so a line in it mirrors each lamp.
-//! The iris is lit as the bowl on which the cornea gathers light, brightest opposite of a lamp's reflection; pigment,
+//! The iris is lit as the bowl on which the cornea gathers light, brightest opposite to a lamp's reflection; pigment,
 //! vessels, caruncle, papillae and patches of the lining are noise of texture coordinates, made for the default head.
 //!
 //! Does not: reflect one part of the head in another; carry light between parts of an eye or the mouth.
@@ -80,9 +80,9 @@ const PARTS: [Module; 3] = [
     module!("shade_mouth", "mouth.wesl"),
 ];
 
-/// Share of a neighbour that scattering gives back to the centre for each millimetre that it is off the centre's tangent
-/// plane. A step of 4 mm (lip over teeth, wing of the nose over cheek) separates fully; the curve of a cheek does not.
-/// Transmittance leaves to scattering what that takes.
+/// Share of a neighbour's light that scattering returns to the centre per millimetre of distance from the centre's
+/// tangent plane. A step of 4 mm (lip over teeth, wing of the nose over cheek) separates fully; the curve of a cheek
+/// does not. Transmittance leaves the rest to scattering.
 pub(crate) const FOLLOW_PER_MM: f32 = 0.25;
 
 /// The shader of the pass.
@@ -113,7 +113,7 @@ fn with_constants(program: Program) -> Program {
         .constant("GUMS", Material::Gums.number())
 }
 
-/// Reflectance of skin seen head on, of the index 1.4.
+/// Reflectance of skin seen head on, with the index 1.4.
 pub(crate) const SKIN_F0: f32 = 0.028;
 
 /// Entries of T(s): a step of 0.03 mm for skin.
@@ -163,7 +163,7 @@ impl Transmittance {
         let table = TransmittanceTable::new(profile, TRANSMITTANCE_ENTRIES, None)?;
         let mut texels: Vec<_> =
             table.values.iter().map(|t| [t[0] as f32, t[1] as f32, t[2] as f32, 1.0]).collect();
-        // What is thicker than the table lets nothing through.
+        // A slab thicker than the table transmits nothing.
         if let Some(last) = texels.last_mut() {
             *last = [0.0; 4];
         }
@@ -178,10 +178,10 @@ impl Transmittance {
     }
 }
 
-/// Radii of taps and outer edges of rings that hold equal shares of the light that reaches a point from a plane behind
-/// it, where the plane is so deep that a quarter of the farthest-reaching channel comes through; the last ring has no end.
+/// Radii of taps and outer edges of rings with equal shares of the light that reaches a point from a plane behind
+/// it, at a depth that a quarter of the farthest-reaching channel passes; the last ring is unbounded.
 fn rings(table: &TransmittanceTable) -> ([f32; RINGS], [f32; RINGS]) {
-    // T falls, so bisect.
+    // T decreases, so bisection finds the radius.
     let thickness_at = |share: f64| {
         let (mut low, mut high) = (0.0, table.thickness_max_mm);
         for _ in 0..50 {
@@ -221,25 +221,25 @@ impl SpecularMethod {
     }
 }
 
-/// What is common to the light of all heads of a frame.
+/// Inputs of the light that all heads of a frame share.
 pub(crate) struct Lighting<'a> {
     pub(crate) light: &'a Illumination<'a>,
     pub(crate) seen: &'a Seen,
-    /// What the pixel's first sample sees, where this is not it: what looks the same there is not shaded again.
+    /// The image of the pixel's first sample, for later samples: surfaces that look the same are not shaded again.
     pub(crate) first: Option<&'a Seen>,
     pub(crate) transmittance: Option<&'a Transmittance>,
     pub(crate) quality: &'a Quality,
 }
 
-/// Light of what is seen.
+/// Light of the visible surfaces.
 #[derive(Clone)]
 pub(crate) struct Lit {
-    /// Diffuse radiance of a white surface; a = depth in mm relative to `View::depth_origin_mm`: a texel is all that a tap
-    /// of scattering needs, and interpolates.
+    /// Diffuse radiance of a white surface; a = depth in mm relative to `View::depth_origin_mm`: a tap of scattering
+    /// needs only this texel, and can interpolate it.
     pub(crate) irradiance: Image,
     /// Linear Rec. 709; a = strength of scattering.
     pub(crate) albedo: Image,
-    /// Specular, and all of what does not scatter.
+    /// Specular, and all light of materials that do not scatter.
     pub(crate) direct: Image,
 }
 
@@ -288,14 +288,14 @@ impl Shade {
         }
     }
 
-    /// Makes what the method of highlights needs.
+    /// Makes the resources of the specular method.
     pub(crate) fn prepare_specular(&mut self, gpu: &Gpu, method: SpecularMethod) {
         if self.directional_albedo.0 != method {
             self.directional_albedo = (method, upload_directional_albedo(gpu, method));
         }
     }
 
-    /// Shades what is seen of heads. `into` takes the light of a first sample that this one may share.
+    /// Shades the visible parts of heads. `into` takes the light of a first sample that this one may share.
     pub(crate) fn record(
         &self,
         r: &mut Recorder<'_>,
@@ -327,7 +327,7 @@ impl Shade {
         lit
     }
 
-    /// Makes what [`Shade::record_samples`] needs.
+    /// Makes the resources of [`Shade::record_samples`].
     pub(crate) fn prepare_samples(&mut self, gpu: &Gpu) {
         self.samples_kernel
             .get_or_insert_with(|| Kernel::new(gpu, "light samples", &samples_program(), "light_samples"));
@@ -349,7 +349,7 @@ impl Shade {
         r.dispatch(kernel, &resources, [count.div_ceil(64), 1, 1]);
     }
 
-    /// What lights a head, on pixels or on points.
+    /// Bindings of the light on a head, for pixels or points.
     fn resources<'a>(
         &'a self,
         lighting: &Lighting<'a>,
@@ -397,10 +397,10 @@ fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
         ColorMethod::Hemoglobin => posed.state.hemoglobin_scale,
     };
     Params {
-        // Maps hold true depths; interreflection between pores, which is not drawn, would deepen them to the eye.
+        // Maps hold true depths. Interreflection between pores, which would make them look deeper, is not drawn.
         slope_scale: 1.35,
         wrinkle_strength: 1.25,
-        // Finite times finite: blood beyond its range is clamped, but NaN would not be.
+        // Keeps the product finite: blood beyond its range is clamped, NaN would not be.
         hemoglobin_scale: hemoglobin_scale.clamp(-1e6, 1e6),
         head: posed.index,
         environment_intensity: lighting.light.environment_intensity,

@@ -9,7 +9,7 @@ use super::directional_albedo::{LEAST_SQUARE, scale_and_bias};
 
 /// Bare skin with one specular lobe.
 pub(crate) struct Skin {
-    /// Linear albedo, as seen from in front.
+    /// Linear albedo, as seen from the front.
     pub(crate) albedo: f64,
     /// Factor of the specular lobe.
     pub(crate) specular: f64,

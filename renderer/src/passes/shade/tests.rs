@@ -1,4 +1,4 @@
-//! Light that spreads within what `scatter` leaves alone.
+//! Light that spreads in materials that `diffusion` does not scatter.
 
 use glam::{DVec3, Mat4, Vec2, Vec3};
 use rubor_rig::face_state::FaceState;
@@ -17,7 +17,7 @@ const SIZE: u32 = 128;
 /// Across the picture.
 const SEEN_MM: f32 = 12.0;
 
-/// A square of a material that faces +Z and, 5 mm before it and beside the picture, a flap of skin.
+/// A square of a material that faces +Z and, 5 mm in front of it and beside the picture, a flap of skin.
 fn head(material: Material, has_flap: bool) -> Head {
     let mut mesh = Mesh::default();
     let mut quad = |low: Vec3, high: Vec3, material: Material| {
@@ -155,7 +155,7 @@ fn a_lamp_on_bare_skin_is_the_equation() {
             };
             let normal = (0..3).map(|k| hit.barycentric[k] * normal_of(k)).sum::<DVec3>().normalize();
             let to_viewer = (camera.position.as_dvec3() - hit.position).normalize();
-            // Past the horizon the shader fades; there the equation has nothing to say.
+            // Past the horizon the shader fades; the equation does not apply there.
             if normal.dot(to_light) < 0.15 || normal.dot(to_viewer) < 0.15 {
                 continue;
             }

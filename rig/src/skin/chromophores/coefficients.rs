@@ -59,7 +59,7 @@ pub fn epidermis_scattering_per_mm(wavelength_nm: f64) -> f64 {
     14.74 * wavelength_nm.powf(-0.22) + 2.2e11 * wavelength_nm.powi(-4)
 }
 
-/// Epidermis with a melanin fraction and the share of `hemoglobin` (dermal fraction) that the model gives it.
+/// Epidermis with a melanin fraction and the model's share of `hemoglobin` (the dermal fraction).
 pub fn epidermis(model: &ChromophoreModel, wavelength_nm: f64, melanin: f64, hemoglobin: f64) -> Medium {
     let melanin_per_mm = model.eumelanin_share * eumelanin_per_mm(wavelength_nm)
         + (1.0 - model.eumelanin_share) * pheomelanin_per_mm(wavelength_nm);
@@ -121,7 +121,7 @@ mod tests {
     fn oxy_and_deoxy_meet_at_the_isosbestic_points() {
         for nm in [390.0, 422.0, 452.4, 500.1, 529.2, 545.3, 570.2, 584.1] {
             let (oxy, deoxy) = (blood_per_mm(nm, 1.0), blood_per_mm(nm, 0.0));
-            // The points are rounded to 0.1 nm, and the table changes by up to 8 % a nm.
+            // The points are rounded to 0.1 nm, and the table changes by up to 8 % per nm.
             assert!((oxy / deoxy - 1.0).abs() < 1e-2, "{nm} nm: {oxy} {deoxy}");
         }
     }

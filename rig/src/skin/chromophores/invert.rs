@@ -1,7 +1,7 @@
 //! From a skin colour back to melanin and hemoglobin.
 //!
 //! The look-up is a surface in CIELAB; a colour is projected on it by damped Gauss-Newton steps from the nearest of a
-//! coarse set of texels. A colour of the surface comes back to itself; the distance of any other is the residual.
+//! coarse set of texels. A colour on the surface is found exactly; for any other the residual is its distance.
 
 use super::{SkinLookup, fractions_at};
 use crate::color::{ciede2000, lab_from_rec709};
@@ -17,7 +17,7 @@ pub struct ChromophoreFit {
     pub residual: f32,
 }
 
-/// Coarse texels along an axis that a search starts from.
+/// Coarse texels per axis from which a search may start.
 const STARTS: u32 = 17;
 
 /// Inverse of a [`SkinLookup`].
@@ -105,7 +105,7 @@ impl<'a> SkinInverse<'a> {
     }
 
     /// The melanin whose colour is nearest (in CIELAB) when the hemoglobin is known: for hair, make-up and shadow,
-    /// whose grey would otherwise be read as blood.
+    /// whose grey would otherwise be taken for blood.
     pub fn fit_melanin(&self, rgb_linear: [f32; 3], hemoglobin: f32) -> ChromophoreFit {
         let target = lab_from_rec709(rgb_linear.map(f64::from));
         let v = super::lookup_address(0.0, f64::from(hemoglobin))[1] as f32;
@@ -117,7 +117,7 @@ impl<'a> SkinInverse<'a> {
         let coarse = |i: u32| i as f32 / steps as f32;
         let best =
             (0..=steps).min_by(|a, b| distance2(coarse(*a)).total_cmp(&distance2(coarse(*b)))).unwrap_or(0);
-        // Lightness falls with melanin, so the distance has one valley around the best step.
+        // Lightness falls with melanin, so the distance has one minimum.
         let (mut low, mut high) = (coarse(best.saturating_sub(1)), coarse((best + 1).min(steps)));
         for _ in 0..20 {
             let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);

@@ -8,10 +8,9 @@
 //! `1 = omega sum_j w_j / (1 - k^2 mu_j^2)`. Boundary conditions give their amplitudes: the dermis becomes an N x N
 //! reflection matrix, and each layer above one linear system of size 2N: a new matrix, or a number under the surface.
 //!
-//! What is computed is the reflectance factor seen along the normal under diffuse light, without the light that the
-//! surface reflects: the d/0 geometry of skin colorimeters. By reciprocity it is also the fraction of a beam along the
-//! normal that comes out again, which is what a photon walk counts. The beam itself needs no resonant
-//! particular solution this way.
+//! The result is the reflectance factor seen along the normal under diffuse light, without the light that the
+//! surface reflects: which is the d/0 geometry of skin colorimeters. By reciprocity it is also the fraction of a beam
+//! along the normal that leaves again, which a photon walk counts. So the beam needs no resonant particular solution.
 
 // Indices are those of the matrices in the equations.
 #![allow(clippy::needless_range_loop)]
@@ -141,7 +140,7 @@ impl Directions {
     }
 
     /// Radiance of each mode in each direction, going with the mode (it decays that way) and against it,
-    /// scaled so that the largest is 1; the third is the source of the mode in that scale.
+    /// scaled so that the largest is 1; the third result is the source of the mode in that scale.
     fn modes(&self, roots: &Vector) -> (Matrix, Matrix, Vector) {
         let (mut with, mut against, mut source) =
             ([[0.0; STREAMS]; STREAMS], [[0.0; STREAMS]; STREAMS], [1.0; STREAMS]);
@@ -161,7 +160,7 @@ impl Directions {
         (with, against, source)
     }
 
-    /// A semi-infinite layer as what its top sends back.
+    /// Reflection operator of a semi-infinite layer at its top.
     pub fn half_space(&self, medium: Medium) -> HalfSpace {
         let roots = self.roots(medium.albedo());
         let (with, against, source) = self.modes(&roots);
@@ -190,10 +189,10 @@ impl Directions {
         half
     }
 
-    /// A layer of `thickness_mm` on what lies below it, as what its top sends back.
+    /// Reflection operator, at its top, of a layer of `thickness_mm` on `base`.
     pub fn over(&self, layer: Medium, thickness_mm: f64, base: &HalfSpace) -> HalfSpace {
         const N: usize = STREAMS;
-        // One incident direction a column, and no surface above.
+        // One column per incident direction, without a surface above.
         let mut entering = [[0.0; N]; N];
         for j in 0..N {
             entering[j][j] = 1.0;
@@ -218,8 +217,8 @@ impl Directions {
         0.5 * self.leaving_normal * normal
     }
 
-    /// For each column of `entering` (by direction) what goes up at the top of a layer in each direction and along the
-    /// normal. `surface` is the internal reflectance above it. `COLUMNS` is 2 N and the number of columns.
+    /// For each column of `entering` (by direction): the radiance upwards at the top of a layer in each direction and
+    /// along the normal. `surface` is the internal reflectance above it. `COLUMNS` is 2 N plus the number of columns.
     fn slab<const CASES: usize, const COLUMNS: usize>(
         &self,
         layer: Medium,
@@ -287,7 +286,7 @@ impl Directions {
     }
 }
 
-/// What a semi-infinite medium, or layers on one, return without a surface.
+/// Reflection of a semi-infinite medium, or of layers on one, without a surface.
 #[derive(Clone, Debug)]
 pub struct HalfSpace {
     /// Radiance up in direction i by unit radiance down in direction j.

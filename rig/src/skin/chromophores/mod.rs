@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! melanin, hemoglobin --coefficients--> sigma_a, sigma_s' of horny layer, epidermis and dermis at 61 wavelengths
-//!                     --layers--------> diffuse reflectance spectrum (discrete ordinates; truth: monte_carlo)
+//!                     --layers--------> diffuse reflectance spectrum (discrete ordinates; reference: monte_carlo)
 //!                     --observer------> linear Rec. 709 under D65
 //! SkinModel: a Chebyshev interpolant of that --bake--> SkinLookup (any size) --> renderer, map synthesis
 //! ```
@@ -10,7 +10,7 @@
 //! Theory and source: Donner and Jensen 2006 (spectra and layers), Jimenez et al. 2010 (parameters, look-up;
 //! papers/004 section 7.6). What differs: reflectance comes from the radiative transfer equation by discrete ordinates
 //! instead of the multipole, which is exact also where absorption is as strong as scattering (dark skin, blue light);
-//! a thin horny layer without melanin lies on the epidermis, without which dark skin is too orange.
+//! a thin horny layer without melanin lies on the epidermis; without it dark skin is too orange.
 //!
 //! The look-up is addressed by `u = cbrt(C_m / 0.5)`, `v = cbrt(C_hd / 0.32)`: equation 7.7 with both axes scaled to
 //! 0..1 over the ranges of table 7.1.
@@ -43,7 +43,7 @@ pub const MAX_MELANIN: f64 = 0.5;
 /// Largest hemoglobin volume fraction of the dermis (papers/004 table 7.1).
 pub const MAX_HEMOGLOBIN: f64 = 0.32;
 
-/// Constants of skin that a map does not change.
+/// Constants of skin that do not come from a map.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChromophoreModel {
@@ -161,7 +161,7 @@ pub struct SkinModel {
     colors: Vec<[[f64; 3]; NODES]>,
 }
 
-/// Chebyshev-Gauss-Lobatto node on 0..1: both ends belong to the nodes.
+/// Chebyshev-Gauss-Lobatto node on 0..1: both ends are nodes.
 fn node(i: usize) -> f64 {
     0.5 - 0.5 * (std::f64::consts::PI * i as f64 / (NODES - 1) as f64).cos()
 }
@@ -230,7 +230,7 @@ impl SkinModel {
         color
     }
 
-    /// A table of `width` (melanin) by `height` (hemoglobin) texels, each at least 2.
+    /// Bakes a table of `width` (melanin) by `height` (hemoglobin) texels, each at least 2.
     pub fn bake(&self, width: u32, height: u32) -> SkinLookup {
         let (width, height) = (width.max(2), height.max(2));
         let along_u: Vec<_> = (0..width).map(|x| node_weights(f64::from(x) / f64::from(width - 1))).collect();
@@ -267,7 +267,7 @@ impl SkinModel {
 /// ranges, so a sampler addresses the texture at `(u * (width - 1) + 0.5) / width`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkinLookup {
-    /// Texels in a row.
+    /// Texels per row.
     pub width: u32,
     /// Rows.
     pub height: u32,

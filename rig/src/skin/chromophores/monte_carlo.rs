@@ -1,8 +1,8 @@
-//! Photon walks in the layers: the truth that the fast solution is compared with.
+//! Photon walks in the layers: the reference for the fast solution.
 //!
 //! A beam enters along the normal; each collision absorbs a share of the photon's weight, and the smooth surface
 //! splits it when it comes back. Lateral position does not matter for total reflectance, so a photon is a depth and a
-//! direction cosine. Random numbers are reproducible: one stream a wavelength from the seed.
+//! direction cosine. Random numbers are reproducible: one stream per wavelength from the seed.
 
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::random::SplitMix64;
 /// How photons walk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walk {
-    /// Photons a wavelength.
+    /// Photons per wavelength.
     pub photons: u32,
     /// Seed of the random numbers.
     pub seed: u64,

@@ -1,4 +1,4 @@
-//! Published colours of skin: what the look-up is checked against.
+//! Published colours of skin, against which the look-up is checked.
 
 /// A published colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,9 +30,9 @@ pub enum Source {
 impl Source {
     /// Largest CIEDE2000 distance of a colour to the nearest one of the model.
     ///
-    /// Measured means are met within their standard error of about 2. The graphs' two lightest points are yellower and
-    /// redder than any other published skin, and so is the light patch of the chart, which is painted. The tones of the
-    /// scale are met within a just noticeable difference.
+    /// The model meets measured means within their standard error of about 2. The graphs' two lightest points are
+    /// yellower and redder than any other published skin, and so is the light patch of the chart, which is painted. The
+    /// tones of the scale are met within a just noticeable difference.
     pub fn tolerance(self) -> f64 {
         match self {
             Self::Xiao2017 => 2.1,

@@ -1,4 +1,4 @@
-//! Published spectra that skin colour rests on, as constants.
+//! Published spectra from which skin colour is computed, as constants.
 //!
 //! Wavelengths are in nanometres, 380 to 780. The tables are measurements and standards, reproduced digit for digit;
 //! small steps in the hemoglobin table (448 to 456 nm, where two data sets meet) belong to the published data.

@@ -69,7 +69,7 @@ fn a_skin_without_absorption_returns_all_that_enters() {
     let base = directions.half_space(grey);
     let [a, b] = [0.01, 3.0].map(|t| directions.reflectance(grey, t, &base));
     assert!((a - b).abs() < 1e-9, "{a} {b}");
-    // And so are three, however they share the depth.
+    // The same holds for three layers of any thickness.
     let three = directions.reflectance(grey, 0.02, &directions.over(grey, 0.1, &base));
     assert!((a - three).abs() < 1e-9, "{a} {three}");
     let odd = coefficients::Medium { absorption_per_mm: 3.0, scattering_per_mm: 6.0 };
@@ -135,7 +135,8 @@ fn melanin_darkens_and_blood_reddens() {
                 assert!(next[0] < here[0], "L* grows with hemoglobin at {i} {j}");
                 // Beyond about 10 % blood skin darkens as a whole and a* levels off with L*; redness for its
                 // lightness still grows.
-                // Dark skin hides its blood, and beyond a quarter of blood the horny layer is most of what is seen.
+                // Dark skin hides its blood, and beyond a quarter of blood most of the light comes from the horny
+                // layer.
                 let [m, h] = fractions_at(f64::from(i) / 40.0, f64::from(j + 1) / 40.0);
                 if m < 0.1 && h < 0.25 {
                     let redness = |lab: [f64; 3]| lab[1] / lab[0];
@@ -172,7 +173,7 @@ fn colors_come_back_as_fractions() {
         }
     }
     assert!(sum / n < 0.01 && worst < 0.2, "mean {} worst {worst}", sum / n);
-    // A blue surface is no skin, and says so.
+    // A blue surface is not skin: the residual is large.
     assert!(inverse.fit([0.05, 0.1, 0.6]).residual > 20.0);
 }
 

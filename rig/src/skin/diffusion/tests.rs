@@ -56,7 +56,7 @@ fn profiles_fall_and_are_finite_from_a_micrometre_to_a_metre() {
             for i in 0..61 {
                 let r = 1e-3 * 10f64.powf(i as f64 / 10.0);
                 let value = model.reflectance(r);
-                // What a slab's series leaves out.
+                // The part that a slab's truncated series leaves out.
                 let rounding = 1e-6 * model.total();
                 assert!(
                     value.is_finite() && value >= 0.0 && value <= previous + rounding,
@@ -90,7 +90,7 @@ fn a_thick_slab_is_a_half_space() {
     let dipole = StandardDipole::new(medium).unwrap();
     let slab = MultipoleSlab::new(SlabShape { medium, thickness_mm: 60.0, side: SlabSide::Lit }).unwrap();
     for r in [0.0, 0.2, 1.0, 4.0] {
-        // The slab places its image by z_b = 2A/(3 sigma_t'), which is where the dipole has it.
+        // The slab places its image by z_b = 2A/(3 sigma_t'), as the dipole does.
         assert!((slab.reflectance(r) / dipole.reflectance(r) - 1.0).abs() < 1e-9, "{r}");
     }
     assert!((slab.total() - dipole.mass_beyond(0.0)).abs() < 1e-12);

@@ -104,7 +104,7 @@ fn fit_to_skin_is_at_least_as_close_as_table_6_1() {
             assert!(best <= own(&other) + 1e-12, "{c}: {best}, {falloff} {strength} {}", own(&other));
         }
     }
-    // As in the table: red reaches farthest, blue least, and most of the light of every channel scatters.
+    // The table says: red reaches farthest, blue least, and most of the light of every channel scatters.
     assert!(fitted.falloff[0] > fitted.falloff[1] && fitted.falloff[1] > fitted.falloff[2], "{fitted:?}");
     assert!(fitted.strength.iter().all(|s| (0.7..=1.0).contains(s)), "{fitted:?}");
 }
@@ -149,7 +149,7 @@ fn edge_error(profile: &Profile, kernel: &SeparableKernel, angle: f64) -> f64 {
         let mut found = 0.0;
         for (a, u) in kernel.weights.iter().zip(&kernel.offsets_mm) {
             for (b, v) in kernel.weights.iter().zip(&kernel.offsets_mm) {
-                // Taps between texels weigh two: an edge is as soft as a pixel of a 30th of the width.
+                // A tap between two texels weighs both, so an edge is as soft as a pixel of a 30th of the width.
                 let side = (x - (cosine * u + sine * v)) / (width / 30.0) + 0.5;
                 found += a[0] * b[0] * side.clamp(0.0, 1.0);
             }

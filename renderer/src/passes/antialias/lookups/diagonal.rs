@@ -9,7 +9,7 @@ pub const DIAGONAL_OFFSETS: [(f64, f64); 5] =
 /// The offset of the same sample seen in a mirror along the stair.
 pub const OPPOSITE_DIAGONAL_OFFSET: [usize; 5] = [0, 2, 1, 4, 3];
 
-/// Areas are counted on a grid of this many points a side, the pixel's border included.
+/// Areas are counted on a grid with this many points per side, the pixel's border included.
 const POINTS: usize = 30;
 
 type Point = (f64, f64);
@@ -53,9 +53,9 @@ pub fn diagonal_area(
 
 /// Fraction of the pixel with its corner at `pixel` which lies strictly right of and below the line.
 ///
-/// Along a row the side of the line changes once, so a row needs the place of the change, not every point.
+/// Within a row the side of the line changes once, so the place of the change is enough.
 ///
-/// A line of no length leaves the pixel covered. (It comes up for stairs of one step only, where shifted
+/// A line of no length leaves the pixel covered. (It occurs only for stairs of one step, where shifted
 /// subsamples can also turn the line around; then every point is tested.)
 fn covered(from: Point, to: Point, pixel: Point) -> f64 {
     if from == to {
@@ -91,10 +91,10 @@ fn covered(from: Point, to: Point, pixel: Point) -> f64 {
 
 /// Exact areas `[below, above]` of the two pixels beside one step of a stair that a straight line left.
 ///
-/// The stair has `before` edges before the step in question and `after` behind it, steps and risers taking turns. It
-/// begins and ends with halves of longer steps, both level or both upright, so that both numbers are even or both odd.
-/// The line runs through the middles of the two longer steps, which are the stair's ends: on one side of its centre
-/// line at the beginning, on the other at the end. `offset` moves the sample inside the pixel.
+/// The stair has `before` edges before the step in question and `after` behind it, with alternating steps and risers.
+/// It begins and ends with halves of longer steps, both level or both upright, so that both numbers are even or both
+/// odd. The line runs through the middles of the two longer steps, which are the stair's ends: on one side of its
+/// centre line at the beginning, on the other at the end. `offset` moves the sample inside the pixel.
 pub fn stair_area(before: usize, after: usize, offset: (f64, f64)) -> [f64; 2] {
     debug_assert_eq!(before % 2, after % 2);
     // The step goes from (0, 0) to (1, 0), y up. With u = x + y along the stair and v = y - x + 1/2 across, the middle

@@ -1,4 +1,4 @@
-//! The tables that morphological antialiasing looks coverage up in, made from geometry.
+//! Coverage tables of morphological antialiasing, computed from geometry.
 //!
 //! ```text
 //!            orthogonal.rs                diagonal.rs                 search.rs
@@ -7,19 +7,19 @@
 //!               |                           |                           |
 //!               +------- area texture ------+                    search texture
 //!               |      160 x 560, RG8                                64 x 16, R8
-//!         AreaTable: one entry a pair of whole distances (what the kernels read)
+//!         AreaTable: one entry per pair of whole distances (what the kernels read)
 //! ```
 //!
 //! Source: J. Jimenez, *Practical real-time strategies for photorealistic skin rendering and antialiasing*,
 //! 2012, sections 9.4.3 and 10.4; J. Jimenez et al., *SMAA: Enhanced Subpixel Morphological Antialiasing*,
-//! 2012. The textures equal those published with SMAA in every byte (tests), and nothing of them is stored
+//! 2012. The textures equal those published with SMAA in every byte (tests), but no part of them is stored
 //! here.
 //!
 //! Differs: the kernels read neither texture. Distances are whole pixels, so [`AreaTable`] holds the value
 //! that a bilinear fetch of the area texture returns for each pair of distances: one read instead of a
 //! square root and a filtered fetch, the same bits on every adapter. Unless the published values are asked for, it
 //! holds exact areas instead of bytes, and other diagonals ([`stair_area`]). The search needs no table at all,
-//! since edges are kept as bits (see `edges.wgsl`); the search texture serves as an oracle for it.
+//! since edges are kept as bits (see `edges.wesl`); the search texture serves as an oracle for it.
 
 mod diagonal;
 mod orthogonal;
@@ -33,7 +33,7 @@ use rayon::prelude::*;
 
 /// Width of the area texture in texels: orthogonal patterns left, diagonal patterns right.
 pub const AREA_WIDTH: usize = 160;
-/// Height of the area texture in texels: one block of 80 rows a subsample offset.
+/// Height of the area texture in texels: one block of 80 rows per subsample offset.
 pub const AREA_HEIGHT: usize = 560;
 /// Distances in an orthogonal slot; texel `i` stands for the distance `i * i`.
 pub const ORTHOGONAL_SLOT: usize = 16;
@@ -89,7 +89,7 @@ pub fn area_texture() -> Vec<u8> {
     texels
 }
 
-/// The area table of chapter 9: 5 x 5 slots of 9 x 9 distances, 2 bytes a texel, 45 texels a row.
+/// The area table of chapter 9: 5 x 5 slots of 9 x 9 distances, 2 bytes per texel, 45 texels per row.
 ///
 /// Distances are linear from 0 to 8 pixels and U patterns are not smoothed.
 pub fn mlaa_area_texture() -> Vec<u8> {
@@ -121,7 +121,7 @@ pub fn mlaa_area_texture() -> Vec<u8> {
 pub struct AreaTable {
     /// All entries.
     pub areas: Vec<u32>,
-    /// Number of distances a side in the orthogonal part: the longest distance plus one.
+    /// Number of distances per side in the orthogonal part: the longest distance plus one.
     pub stride: u32,
     /// Index of the first diagonal entry.
     pub diagonal_base: u32,
@@ -132,7 +132,7 @@ impl AreaTable {
     /// for the given blocks of subsample offsets. Diagonals exist for blocks 0 to 4.
     ///
     /// # Panics
-    /// When a block does not exist or `longest` is over 225, the last distance in the texture.
+    /// A block does not exist or `longest` is over 225, the last distance in the texture.
     pub fn smaa(
         texture: &[u8],
         longest: usize,
@@ -194,7 +194,7 @@ impl AreaTable {
     /// for the given blocks of subsample offsets. Stairs exist for blocks 0 to 4.
     ///
     /// # Panics
-    /// When a block does not exist.
+    /// A block does not exist.
     pub fn exact(
         longest: usize,
         steps: usize,
@@ -221,7 +221,7 @@ impl AreaTable {
             areas.extend(diagonal_blocks.iter().flat_map(|&block| {
                 (0..slot * slot).map(move |i| {
                     let (before, after) = (i / slot, i % slot);
-                    // Ends that differ are no straight line.
+                    // Ends that differ do not belong to a straight line.
                     let line = before % 2 == after % 2;
                     if line { pack(stair_area(before, after, DIAGONAL_OFFSETS[block])) } else { 0 }
                 })
@@ -251,7 +251,7 @@ fn all_crossings() -> impl Iterator<Item = (Crossing, Crossing)> {
     (0..4).flat_map(|far| (0..4).map(move |near| (near, far)))
 }
 
-/// The published textures cut the fraction off instead of rounding it.
+/// The published textures truncate instead of rounding.
 fn truncate_to_byte(fraction: f64) -> u8 {
     (fraction * 255.0) as u8
 }

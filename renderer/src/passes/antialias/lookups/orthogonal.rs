@@ -10,7 +10,7 @@ pub const ORTHOGONAL_OFFSETS: [f64; 7] = [0.0, -0.25, 0.25, -0.125, 0.125, -0.37
 /// their area, which hides the kink that a short one would show.
 const SMOOTHED_LENGTH: f64 = 32.0;
 
-/// What becomes of U patterns.
+/// Treatment of U patterns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Smoothing {
     /// Exact areas, as in chapter 9. The middle of a U is moved against the sample's offset, which flattens it for
@@ -86,7 +86,7 @@ fn area_beside(start: (f64, f64), end: (f64, f64), pixel: f64) -> [f64; 2] {
     if from >= to {
         return [0.0, 0.0];
     }
-    // Products before quotients: the published bytes are cut off, not rounded, and show the last bit.
+    // Products before quotients: the published bytes are truncated, not rounded, and depend on the last bit.
     let (run, rise) = (end.0 - start.0, end.1 - start.1);
     let height = |x: f64| start.1 + rise * (x - start.0) / run;
     let (first, last) = (height(from), height(to));

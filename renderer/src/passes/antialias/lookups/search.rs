@@ -1,4 +1,4 @@
-//! The search texture: what one bilinear fetch of the edges says about the end of a line.
+//! The search texture: decodes the end of a line from one bilinear fetch of the edges.
 //!
 //! A fetch a quarter of a pixel to the left and an eighth up of a pixel's centre mixes four edge bits with the
 //! weights 21, 7, 3 and 1 (in 1/32), so that each of the 16 combinations has a sum of its own (equation 10.5).

@@ -1,7 +1,7 @@
 use super::*;
 use std::path::PathBuf;
 
-/// The published table in `file`, or nothing where the shared data is not at hand.
+/// The published table in `file`, or `None` without the shared data.
 fn published(file: &str) -> Option<Vec<u8>> {
     let Some(folder) = std::env::var_os("RUBOR_SHARED") else {
         crate::testing::skipped(&format!("RUBOR_SHARED is not set, {file} is not compared"));
@@ -58,7 +58,7 @@ fn areas_of_known_lines() {
     assert_eq!(area(0, 2, 3, 0), [0.375, 0.0]);
     // From above to below: the middle pixel of an odd length has both parts.
     assert!(area(1, 2, 1, 1).iter().all(|a| (a - 1.0 / 24.0).abs() < 1e-15));
-    // No crossing, or both at both ends: nothing to go by.
+    // No crossing, or both at both ends: no contour follows.
     assert_eq!(area(0, 0, 5, 2), [0.0, 0.0]);
     assert_eq!(area(3, 3, 5, 2), [0.0, 0.0]);
 }

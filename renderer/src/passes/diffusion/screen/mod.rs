@@ -4,10 +4,10 @@
 //! irradiance (a = depth), strength, depth --the method of the frame--> scattered (rgba16f, linear Rec. 709)
 //! ```
 //!
-//! All methods keep to the same rules: kernels are in millimetres on the surface, projected with the depth, field of view
-//! and tilt at each pixel and scaled by its strength; a neighbour off the tangent plane of the centre, or one that is not
-//! skin, gives way to the centre; a pixel whose kernel is under half a pixel keeps its light; weights sum to one, so even
-//! light stays even.
+//! All methods follow the same rules: kernels are in millimetres on the surface, projected with the depth, field of
+//! view and tilt at each pixel and scaled by its strength; a neighbour off the tangent plane of the centre, or one that
+//! is not skin, is replaced by the centre; a pixel whose kernel is under half a pixel keeps its light; weights sum to
+//! one, so uniform light stays uniform.
 //!
 //! Does not: scatter across depth steps, or through thin parts (that is transmittance, in `shade`).
 
@@ -27,5 +27,5 @@ mod tests;
 use crate::device::wgsl::{Module, module};
 pub(crate) use crate::passes::shade::FOLLOW_PER_MM;
 
-/// What the shaders of all screen methods share.
+/// Modules that the shaders of all screen methods share.
 pub(crate) const COMMON: Module = module!("screen_common", "common.wesl");

@@ -1,4 +1,4 @@
-//! The methods on the CPU, in f64 and from their equations; the truth of the parity tests.
+//! The methods on the CPU, in f64 and from their equations; the reference of the parity tests.
 
 use std::rc::Rc;
 
@@ -9,16 +9,16 @@ use super::gauss::{self, Level};
 
 /// Where relative depths begin, mm.
 pub(crate) const DEPTH_ORIGIN_MM: f64 = 400.0;
-/// A sample this near to the tangent plane is of one surface.
+/// A sample this near to the tangent plane is on the same surface.
 const PLANE_MM: f64 = 0.1;
-/// So is one that is as near as a surface with a radius of 25 mm.
+/// A sample as near as a surface with a radius of 25 mm also is.
 const CURVATURE_PER_MM: f64 = 0.02;
-/// Relative depth of what is not skin.
+/// Relative depth of pixels that are not skin.
 const FAR_MM: f64 = 8192.0;
-/// Pixels of one texel of a halved image are of one surface up to here, mm.
+/// Largest depth difference of pixels that one texel of a halved image averages, mm.
 const ONE_SURFACE_MM: f64 = 4.0;
 
-/// Share of a neighbour lost for a millimetre off the tangent plane.
+/// Share of a neighbour's light lost per millimetre off the tangent plane.
 const FOLLOW_PER_MM: f64 = super::FOLLOW_PER_MM as f64;
 
 /// Inputs of the methods. Depth is infinite where there is no skin.
@@ -26,12 +26,12 @@ const FOLLOW_PER_MM: f64 = super::FOLLOW_PER_MM as f64;
 pub(crate) struct Frame {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Pixels a radian.
+    /// Pixels per radian.
     pub(crate) focal_px: f64,
     pub(crate) color: Vec<[f64; 3]>,
     pub(crate) strength: Vec<f64>,
     pub(crate) depth_mm: Vec<f64>,
-    /// Of an image that was halved: the view, and how often it was.
+    /// For a halved image: the view, and the number of halvings.
     pub(crate) view: Option<(Rc<Frame>, u32)>,
 }
 
@@ -50,7 +50,7 @@ impl Frame {
         y * self.width + x
     }
 
-    /// Depth as the image of light keeps it.
+    /// Depth as rounded in the image of light.
     pub(crate) fn relative_mm(&self, i: usize) -> f64 {
         f16::from_f64((self.depth_mm[i] - DEPTH_ORIGIN_MM).clamp(-FAR_MM, FAR_MM)).to_f64()
     }
@@ -59,7 +59,7 @@ impl Frame {
         self.focal_px / self.depth_in_view(i).unwrap_or(self.depth_mm[i])
     }
 
-    /// The view, and where the middle of a pixel is in it.
+    /// The view, and the position of the middle of a pixel in it.
     fn in_view(&self, x: i64, y: i64) -> (&Self, i64, i64) {
         match &self.view {
             None => (self, x, y),
@@ -70,7 +70,7 @@ impl Frame {
         }
     }
 
-    /// Depth as slopes go by, where the view shows the same surface as a halved image.
+    /// Depth for slopes, where the view shows the same surface as a halved image.
     fn depth_in_view(&self, i: usize) -> Option<f64> {
         let (view, x, y) = self.in_view((i % self.width) as i64, (i / self.width) as i64);
         let there = view.depth_mm[view.index(x, y)];

@@ -20,7 +20,7 @@ use crate::testing::{assert_layout, assert_workgroups, gpu, half_image, offsets,
 /// Distance of the near plane of test views, metres.
 const NEAR: f32 = 0.01;
 
-/// Every method that needs only a frame.
+/// Every method that draws in one frame.
 const METHODS: [ScatterMethod; 6] = [
     ScatterMethod::Separable(17),
     ScatterMethod::ScreenGauss(4),
@@ -82,7 +82,7 @@ impl Frame {
     }
 }
 
-/// A depth image can only be drawn.
+/// A depth image can only be written by drawing.
 fn draw_depth(gpu: &Gpu, frame: &Frame) -> Image {
     let shader = gpu.shader(
         "test depth",
@@ -183,7 +183,7 @@ fn skin() -> Arc<Profile> {
     Arc::new(Profile::deon_six())
 }
 
-/// Two tilted surfaces, holes, noise and very bright pixels at an odd size; 2.2 pixels a millimetre.
+/// Two tilted surfaces, holes, noise and very bright pixels at an odd size; 2.2 pixels per millimetre.
 fn hostile(seed: u64) -> Frame {
     let mut random = Random(seed);
     let mut noise: Vec<f64> = (0..27 * 51 * 8).map(|_| random.next()).collect();
@@ -220,7 +220,7 @@ fn assert_close(name: &str, found: &[[f64; 4]], expected: &Frame, relative: f64)
     assert_between(name, found, [expected; 3], relative);
 }
 
-/// As [`assert_close`], and the truth may lie anywhere between three frames.
+/// As [`assert_close`], and the reference may lie anywhere between three frames.
 fn assert_between(name: &str, found: &[[f64; 4]], expected: [&Frame; 3], relative: f64) {
     let largest = expected[0].color.iter().flatten().fold(0.0f64, |a, b| a.max(*b));
     for (i, f) in found.iter().enumerate() {
@@ -328,7 +328,7 @@ fn gaussians_agree_with_their_equations() {
         let gaussians = gauss::gaussians(&profile, terms).unwrap();
         let plan = gauss::plan(&gaussians, 900.0 / 431.0);
         assert!(plan.len() > 1 && !plan[0].steps.is_empty(), "{plan:?}");
-        // Means of depths are rounded to halves, by up to 1/32 mm here: the plane of a texel is that much unsure.
+        // Means of depths are rounded to halves, by up to 1/32 mm here: the plane of a texel is uncertain by that much.
         let unsure = [0.0, -1.0 / 32.0, 1.0 / 32.0];
         let expected = [0, 1, 2].map(|i| frame.gaussians(&plan, TAP_SHIFTS[i], unsure[i]));
         let found = run(gpu, ScatterMethod::ScreenGauss(terms as u32), &profile, &frame);
@@ -338,7 +338,7 @@ fn gaussians_agree_with_their_equations() {
 
 #[test]
 fn accumulated_weights_are_those_of_table_4_2() {
-    // So few pixels a millimetre that every Gaussian runs on the view itself.
+    // So few pixels per millimetre that every Gaussian runs on the view itself.
     let plan = gauss::plan(&gauss::gaussians(&skin(), 6).unwrap(), 0.1);
     let steps = &plan[0].steps;
     assert_eq!((plan.len(), steps.len()), (1, 5));
@@ -374,7 +374,7 @@ fn the_exact_kernel_agrees_with_integrals_over_pixels() {
             q(x1, y1) - q(x0, y1) - q(x1, y0) + q(x0, y0)
         })
     };
-    // Only a corner: the truth is slow.
+    // Only a corner, because the reference is slow.
     let corner = corner(&frame, 9, 11);
     let found = run(gpu, ScatterMethod::ReferenceScreen, &profile, &corner);
     // Linear interpolation in the table, 0.006 mm between entries where a Gaussian has 0.08 mm.
@@ -504,7 +504,7 @@ fn kernels_scale_with_lens_distance_and_skin() {
         ];
         for (what, other) in &same {
             for (a, b) in once.iter().zip(other) {
-                // Fits and quantiles of the larger skin are found again, and end a little elsewhere.
+                // Fits and quantiles of the larger skin are computed anew and end at slightly different values.
                 assert!(
                     (0..3).all(|c| (a[c] - b[c]).abs() <= 4e-3 * (1.0 + a[c])),
                     "{method}, {what}: {a:?} {b:?}"
@@ -531,7 +531,7 @@ fn no_light_crosses_a_gap() {
         });
         for (i, p) in run(gpu, method, &skin(), &frame).iter().enumerate() {
             let expected = frame.color[i][0];
-            // A bilinear tap near the plane may hold a little of what is 8 mm away: line.wgsl says how near.
+            // A bilinear tap near the plane may hold a little of what is 8 mm away: line.wesl says how near.
             let is_linear = matches!(method, ScatterMethod::Separable(_) | ScatterMethod::ScreenGauss(_));
             let bound = if is_linear { 0.001 * 4.0 } else { 1e-6 };
             assert!((0..3).all(|c| (p[c] - expected).abs() < bound), "{method} at {}: {p:?}", i % 61);

@@ -2,17 +2,17 @@
 //!
 //! ```text
 //! positions --CPU: stratified by area, sorted into a grid--> samples --light_samples--> light of each
-//!        irradiance, depth, samples, light --gather, a batch at a time--> sums, squares --finish--> scattered
+//!        irradiance, depth, samples, light --gather, one batch at a time--> sums, squares --finish--> scattered
 //! ```
 //!
 //! Theory: radiant exitance is the integral of R(|x - y|) E(y) over the surface (Jensen et al. 2001 with a diffusion
-//! profile; papers/004 eq. 5.1 without the plane). E has the frame's own lights, shadows and maps; light that comes from
-//! behind, across gaps or around edges is in it, so frames with this method use no transmittance.
+//! profile; papers/004 eq. 5.1 without the plane). E uses the frame's own lights, shadows and maps and includes light
+//! that arrives from behind, across gaps or around edges, so frames with this method use no transmittance.
 //!
-//! Inside of a millimetre the surface counts as flat: there the integral is the light of a disk times E(x), plus the
-//! sampled difference of E (a control variate; without it the steep centre of R would be nearly all noise).
+//! Within a radius of a millimetre the surface counts as flat: there the integral is the light of a disk times E(x),
+//! plus the sampled difference of E (a control variate; without it the steep centre of R would be nearly all noise).
 //!
-//! The error falls at least as 1 / sqrt(N); the spread of the batches gives an estimate of it.
+//! The error falls at least as 1 / sqrt(N); it is estimated from the spread of the batches.
 //!
 //! Does not: see skin outside of the picture's frame by more than the kernel, average light over a pixel.
 
@@ -33,7 +33,7 @@ use crate::scene::view::Seen;
 #[cfg(test)]
 mod tests;
 
-/// Samples of a batch.
+/// Samples per batch.
 pub(crate) const BATCH: usize = 65_536;
 /// Entries of the table of R.
 const ENTRIES: usize = 4096;
@@ -41,12 +41,12 @@ const ENTRIES: usize = 4096;
 const COVERAGE: f64 = 0.9999;
 /// Radius inside of which the surface counts as flat, mm; ears and lids are thicker.
 const NEAR_MM: f64 = 1.0;
-/// Strength from which a pixel counts as bare skin. Under hair it is lower: kernels are narrow there, few samples meet
-/// them, and what noise is left is not that of skin.
+/// Strength from which a pixel counts as bare skin. Under hair strength is lower: kernels are narrow there, few samples
+/// hit them, and the remaining noise is not that of skin.
 pub const BARE_SKIN: f32 = 0.5;
-/// Cells of the grid in the radius of the kernel.
+/// Cells of the grid per radius of the kernel.
 const CELLS_PER_RADIUS: f32 = 2.0;
-/// Most cells of a grid; larger ones grow their cells.
+/// Largest number of cells of a grid; larger grids get larger cells.
 const MOST_CELLS: f32 = 4e6;
 
 const SHADER: Module = module!("reference_surface", "surface.wesl");
@@ -56,10 +56,10 @@ pub(crate) fn program() -> Program {
     Program::new(SHADER)
 }
 
-/// Size of the picture with its surroundings over its own, for light that comes in from outside of it.
+/// Size of the picture with its margin relative to the picture, for light that scatters in from outside.
 const PICTURE_MARGIN: f32 = 1.25;
 
-/// What the frame has to prepare: the integral sees backs and surroundings, and holds the light through thin parts.
+/// Requirements on the frame: the integral needs backs and the margin, and includes the light through thin parts.
 pub(crate) const NEEDS: Needs = Needs { backs: true, margin: PICTURE_MARGIN, transmittance: false };
 
 #[repr(C)]
@@ -84,7 +84,7 @@ pub(crate) struct SurfaceSample {
     pub(crate) barycentric: [f32; 4],
 }
 
-/// Skin triangles of a head that the picture can need.
+/// Skin triangles of a head that can contribute to the picture.
 pub(crate) struct Skin {
     /// Index in the head's list, and corners in world space, metres.
     triangles: Vec<(u32, [Vec3; 3])>,
@@ -108,8 +108,8 @@ struct Grid {
 }
 
 impl Skin {
-    /// Chooses triangles (three vertices and a material each) that are in the picture or as far outside as light comes in
-    /// from.
+    /// Chooses triangles (three vertices and a material each) that are in the picture or so near to it that light
+    /// scatters in from.
     pub(crate) fn new(
         triangles: &[[u32; 4]],
         point_of_vertex: &[u32],
@@ -117,7 +117,7 @@ impl Skin {
         clip_from_world: &Mat4,
     ) -> Self {
         let skin = Material::Skin.number();
-        // Beyond one side of the widened picture with all corners, and before the camera.
+        // All corners beyond one side of the widened picture, and in front of the camera.
         let is_outside = |corners: &[Vec3; 3]| {
             let c = corners.map(|p| *clip_from_world * p.extend(1.0));
             let beyond =
@@ -309,7 +309,7 @@ impl Surface {
     }
 }
 
-/// Root mean square standard error of the mean over that of the result, all channels of all pixels of bare skin; nothing
+/// Root mean square standard error of the mean over that of the result, all channels of all pixels of bare skin; `None`
 /// from fewer than two batches.
 ///
 /// # Errors

@@ -35,7 +35,7 @@ fn head(quads: &[([[f32; 3]; 4], Material)]) -> Head {
     Head { name: "test".into(), mesh, ..Head::default() }
 }
 
-/// What shines on a test.
+/// The light of a test.
 struct Lit {
     lights: Vec<Light>,
     sky: Option<EnvironmentMap>,
@@ -120,7 +120,7 @@ fn difference(found: &[[f32; 4]], expected: impl Fn(usize) -> [f64; 3]) -> f64 {
 fn half_a_plane_in_light_gives_the_line_spread() {
     let quads = [
         (square(45.0, 0.0), Material::Skin),
-        // Shades x < 0 from above the camera.
+        // Casts a shadow on x < 0 from above the camera.
         ([[-45.0, -45.0, 40.0], [0.0, -45.0, 40.0], [0.0, 45.0, 40.0], [-45.0, 45.0, 40.0]], Material::Teeth),
     ];
     let light = Light {
@@ -198,7 +198,7 @@ fn a_disk_of_light_gives_its_convolution() {
     assert!(error < 0.005, "{error}");
 }
 
-/// Thickness of the wedge for each millimetre along x.
+/// Thickness of the wedge per millimetre along x.
 const SLOPE: f64 = 0.11;
 
 /// From 0 mm at x = -50 to 11 mm at x = 50, seen from its flat side.
@@ -281,7 +281,7 @@ fn a_wedge_lit_from_behind_follows_the_transmittance() {
         }
     }
     assert!(compared > 1000, "{compared}");
-    // And without the method nothing comes through.
+    // Without the method no light passes through.
     let dark = draw(&head, light, 100.0, 8, ScatterMethod::None, TransmitMethod::None).unwrap().0;
     assert!(dark.iter().all(|p| p[..3] == [0.0; 3]));
 }
@@ -313,7 +313,7 @@ fn only_skin_scatters() {
         if y.abs() > 35.0 || strip >= materials.len() || (x + 40.0) % 10.0 < 2.0 || (x + 40.0) % 10.0 > 8.0 {
             continue;
         }
-        // What does not scatter is no diffuse light of skin: black, without strength.
+        // Materials that do not scatter have no diffuse light of skin: black, without strength.
         let is_skin = materials[strip] == Material::Skin;
         assert_eq!(f[3] > 0.0, is_skin, "{:?}: {f:?}", materials[strip]);
         assert_eq!(f[..3] == [0.0; 3], !is_skin, "{:?}: {f:?}", materials[strip]);

@@ -8,14 +8,14 @@
 //! theory of blendshape facial models"). The thesis streams shapes out pass by pass (papers/004 section 7.6); here
 //! one dispatch gathers, point by point, only the shapes that move the point.
 //!
-//! Ambient visibility follows by the same weights: what a shape changes at 0.5 and 1 was traced at import
+//! Ambient visibility uses the same weights: the changes of a shape at 0.5 and 1 were traced at import
 //! (`rubor_rig::head::OcclusionChange`; `docs/occlusion.md` has its error). The sum over shapes is clamped to 0..1.
 //!
-//! Truth: `rubor_rig::deform::{deform_points, blend_occlusion}`.
+//! Reference: `rubor_rig::deform::{deform_points, blend_occlusion}`.
 //!
-//! Does not: normals (see `surface_frames`), combination shapes (the rig resolves them to weights).
+//! Does not: normals (see `tangent_frames`), combination shapes (the rig resolves them to weights).
 //!
-//! Cost: reads 16 bytes a delta and a point once; bound by the launch on a large GPU.
+//! Cost: reads 16 bytes per delta and each point once; bound by the dispatch on a large GPU.
 
 use glam::Mat4;
 

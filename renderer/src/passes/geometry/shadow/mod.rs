@@ -4,8 +4,8 @@
 //! positions, light --shadow--> depth layer (0 near, 1 far)
 //! ```
 //!
-//! Theory: shadow maps (Williams 1978). A map shows what the camera sees of the heads and no more, so a close-up of a nose
-//! has the resolution of the nose; whatever stands before that towards the light is in it. Windows come in steps, so
+//! Theory: shadow maps (Williams 1978). A map covers only the parts of the heads that the camera sees, so a close-up of
+//! a nose has the resolution of the nose; everything between them and the light is included. Windows move in steps, so
 //! that shadows do not crawl as the camera moves. All triangles are drawn, front and back: a mouth or a nostril must
 //! block light from either side. The soft edge is in `shade` (percentage-closer soft shadows).
 
@@ -45,7 +45,7 @@ impl Shadow {
         Self { kernel }
     }
 
-    /// Draws the opaque triangles of all heads as lights see them, a layer each; one empty layer where there are none.
+    /// Draws the opaque triangles of all heads as lights see them, one layer per light; one empty layer without lights.
     pub(crate) fn record(
         &self,
         r: &mut Recorder<'_>,

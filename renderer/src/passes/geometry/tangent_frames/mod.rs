@@ -5,10 +5,10 @@
 //! ```
 //!
 //! Theory: the normal of a point is the area-weighted mean of its triangles' normals; the tangent follows u, made
-//! orthogonal to the normal (Lengyel 2001). Recomputed from the deformed triangles, so it is right for every weight;
-//! blending the normals of shapes, the usual way, is not once two shapes meet.
+//! orthogonal to the normal (Lengyel 2001). Both are recomputed from the deformed triangles, so they are right for
+//! every weight; the usual blending of the shapes' normals is wrong where two shapes overlap.
 //!
-//! Truth: `rubor_rig::deform::{point_normals, vertex_tangents}`.
+//! Reference: `rubor_rig::deform::{point_normals, vertex_tangents}`.
 //!
 //! Cost: every vertex reads its ring of about six triangles; the positions stay in cache.
 

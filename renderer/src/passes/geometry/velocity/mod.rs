@@ -5,11 +5,12 @@
 //! ```
 //!
 //! Theory: the point that a pixel sees keeps its barycentric coordinates, so its previous place is known exactly:
-//! morphs, head motion and camera are all in the two sets of positions and matrices (papers/004 section 10.3.3).
+//! morphs, head motion and camera are all contained in the two sets of positions and matrices (papers/004 section
+//! 10.3.3).
 //!
 //! Hair and lashes mix their own motion in afterwards (see `cropped_hair` and `overlay`).
 //!
-//! Does not: follow what moves on the surface (blood, wrinkles).
+//! Does not: follow motion on the surface (blood, wrinkles).
 
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
@@ -34,11 +35,11 @@ impl Velocity {
         Self { kernel: Kernel::new(gpu, "velocity", &program(), "screen_velocity") }
     }
 
-    /// The motion of what is seen of heads, in the order of their ids.
+    /// Motion of the visible parts of heads, in the order of their ids.
     pub(crate) fn record(&self, r: &mut Recorder<'_>, seen: &Seen, heads: &[PosedHead<'_>]) -> Image {
         let size = seen.ids.size();
         let spec = ImageSpec::light(size).also(wgpu::TextureUsages::RENDER_ATTACHMENT);
-        // Without heads nothing is written, and a new image is zero.
+        // Without heads nothing is written; a new image is zero.
         let velocity = match heads.is_empty() {
             true => Image::new(r.gpu, "velocity", spec),
             false => r.image("velocity", spec),

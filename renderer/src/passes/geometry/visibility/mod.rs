@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Theory: Burns and Hunt 2013, "The visibility buffer". The only rasterised pass of the frame that covers the head;
-//! its fragment shader stores one integer, everything else is compute (see ARCHITECTURE.md for what that saves).
+//! its fragment shader stores one integer, everything else is compute (ARCHITECTURE.md has the measurement).
 //! Reversed infinite depth keeps 24 bits at any distance (Lapidous and Jiao 1999).
 
 use crate::device::wgsl::{Module, Program, module};
@@ -17,7 +17,7 @@ use crate::scene::PosedHead;
 
 const SHADER: Module = module!("visibility", "visibility.wesl");
 
-/// The shader of the pass, for a device that numbers triangles or for one that does not.
+/// The shader of the pass, for devices with and without a primitive index.
 pub(crate) fn program(numbered: bool) -> Program {
     Program::new(SHADER).flag("numbered", numbered)
 }
@@ -41,7 +41,7 @@ impl Visibility {
         Self::with_numbers(gpu, gpu.device.features().contains(wgpu::Features::PRIMITIVE_INDEX))
     }
 
-    /// Both ways give the same image.
+    /// Both variants give the same image.
     pub(crate) fn with_numbers(gpu: &Gpu, is_numbered: bool) -> Self {
         let [vertex, fragment] = entries(is_numbered);
         let kernel = RasterKernel::new(
@@ -109,7 +109,7 @@ mod tests {
     fn triangles_are_the_same_whoever_numbers_them() {
         let Some(gpu) = gpu() else { return };
         if !gpu.device.features().contains(wgpu::Features::PRIMITIVE_INDEX) {
-            crate::testing::skipped("this device does not number triangles");
+            crate::testing::skipped("this device has no primitive index");
             return;
         }
         let head = dome();

@@ -1,13 +1,13 @@
-//! Cropped hair: short single hairs where the map of hair says that the skin is covered, so that neither the hairline
-//! nor the outline of the scalp is the edge of a painted cap.
+//! Cropped hair: short single hairs where the hair map marks the skin as covered, so that neither the hairline
+//! nor the outline of the scalp looks like the edge of a painted cap.
 //!
 //! ```text
 //! hair map, rest mesh --roots, once--> triangle, place, flow, length
 //! roots, positions, frames, depth (tested), light, hdr --cropped_hair--> hdr, velocity (premultiplied over)
 //! ```
 //!
-//! A hair is one triangle of 0.14 mm at its root, drawn no thinner than a pixel and faded by what it lacks. Its light is
-//! that of `fibre`, at its root under the depth of the hairs around it and at its tip in the open. It moves with its
+//! A hair is one triangle of 0.14 mm at its root, drawn no thinner than a pixel and faded by its missing width. Its
+//! light is that of `fibre`: its root is dimmed by the hairs around it, its tip is not. It moves with its
 //! root.
 //!
 //! Does not: sort (hairs of one colour), cast shadows.

@@ -48,7 +48,7 @@ fn hairs_stand_where_the_map_has_hair_and_flow_along_the_skin() {
         let point = |i: usize| head.mesh.points[of(i).point as usize];
         let [x, y] = unorm(root.weights);
         let v = x * of(0).uv.y + y * of(1).uv.y + (1.0 - x - y) * of(2).uv.y;
-        // Bilinear fetches reach over by a texel.
+        // Bilinear fetches reach one texel beyond.
         assert!(v < 0.5 + 1.0 / 64.0, "a hair at v = {v}");
         let halves = [root.flow as u16, (root.flow >> 16) as u16].map(|b| half::f16::from_bits(b).to_f32());
         let flow = halves[0] * (point(1) - point(0)) + halves[1] * (point(2) - point(0));
@@ -85,7 +85,7 @@ fn a_hair_moves_with_its_root() {
     let mut head = dome();
     head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
     let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
-    // 21 mm of the lower edge of the dome, seen from so far that depth hardly matters: a hair is 1.7 pixels wide.
+    // 21 mm of the lower edge of the dome, seen from so far that perspective hardly matters: a hair is 1.7 pixels wide.
     let edge = Vec3::new(0.0, -0.08, 0.0358);
     let distance = 0.6;
     let size = 256u32;
@@ -93,7 +93,7 @@ fn a_hair_moves_with_its_root() {
     let pixels_per_metre = size as f32 / 0.021;
     let mut settings = settings([size; 2]);
     settings.quality.antialias = AntialiasMethod::SmaaT2x;
-    // The head nods sideways about the axis of the camera; the edge stands still but for that.
+    // The head nods sideways about the axis of the camera; otherwise the edge stands still.
     let turn = 0.002f32;
     for angle in [0.0, turn] {
         let mut state = FaceState::neutral(&head);
@@ -122,7 +122,8 @@ fn a_hair_moves_with_its_root() {
             }
             hairs += 1;
             farthest_mm = farthest_mm.max((y as f32 - size as f32 / 2.0) / pixels_per_metre * 1e3);
-            // Roots lie on the edge or up to 6 mm above; where blended hairs leave some of the background it stands still.
+            // Roots lie on the edge or up to 6 mm above; the part of the background that shows between blended hairs
+            // stands still.
             assert!(right < 1.01 * root_pixels && right > 0.0, "{right} of {root_pixels} at {x}, {y}");
             assert!(down.abs() < 0.08 * root_pixels, "{down} at {x}, {y}");
         }

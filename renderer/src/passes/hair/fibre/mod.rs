@@ -1,7 +1,7 @@
 //! Light on hair, for the passes that draw it: a fibre with three lobes and the light of its neighbours.
 //!
 //! ```text
-//! lamps, shadow maps, environment, place and direction of a hair --hair_radiance--> radiance, once a vertex
+//! lamps, shadow maps, environment, place and direction of a hair --hair_radiance--> radiance, once per vertex
 //! ```
 //!
 //! Theory: a fibre is a rough dielectric cylinder of coloured glass (Marschner et al. 2003, "Light scattering from human
@@ -13,10 +13,11 @@
 //! ```
 //!
 //! - mirrored off the cuticle: N = cos(phi / 2) / 4, A = Fresnel. Scales lean towards the tip, so light leaves nearer to
-//!   the root's side than a mirror sends it, and the highlight on a head stands nearer to the tips;
-//! - through the fibre (of which 0.15 is seen, as cropped hair lies on more hair), and returned off its far side: shifted
-//!   half as far and twice as far the other way, as Marschner found, and coloured by absorption along the way inside;
-//! - what other hairs pass on: a Lambertian cylinder (Kajiya and Kay 1989, with the half of it that the light reaches).
+//!   the root than from a mirror, and the highlight on a head appears nearer to the tips;
+//! - through the fibre (a share of 0.15 is visible, as cropped hair lies on more hair), and returned off its far side:
+//!   shifted half as far and twice as far the other way, as Marschner found, and coloured by absorption along the way
+//!   inside;
+//! - light from other hairs: a Lambertian cylinder (Kajiya and Kay 1989, with the half of it that the light reaches).
 //!
 //! M is a Gaussian in the sum of sines and the lobes' azimuths are exponentials of its cosine (B. Karis 2016, "Physically
 //! based hair shading in Unreal"); each is scaled here to integrate to one over directions. Absorption follows from the
@@ -28,10 +29,11 @@
 //! towards the root. The environment gives a prefiltered look-up along the mirrored direction for the first lobe and its
 //! irradiance for the rest.
 //!
-//! Costs, on an H100 at 1920 x 1080 with three lamps and an environment: the cropped hairs of a head take 0.285 ms where
-//! they took 0.183 with the light of the skin under them, brows and lashes 0.059 where they took 0.046.
+//! Costs, on an H100 at 1920 x 1080 with three lamps and an environment: the cropped hairs of a head take 0.285 ms
+//! (0.183 with the light of the skin under them), brows and lashes 0.059 ms (0.046).
 //!
-//! Does not: follow single paths between hairs, cast the hair's own shadow on skin, know elliptic fibres or their glints.
+//! Does not: follow single paths between hairs, cast the hair's own shadow on skin, model elliptic fibres or their
+//! glints.
 
 #[cfg(test)]
 mod reference;
@@ -59,7 +61,7 @@ pub(crate) struct HairLight {
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
 
-/// What reads the light of a scene.
+/// Bindings and constants that the light of a scene needs.
 pub(crate) struct Fibre {
     compare: wgpu::Sampler,
     trilinear_repeat: wgpu::Sampler,

@@ -72,7 +72,7 @@ fn the_kernel_is_the_equations() {
     }
 }
 
-/// Power that leaves a length of fibre for unit irradiance across the light, over that which it catches.
+/// Power that leaves a length of fibre for unit irradiance across the light, over the power that it intercepts.
 fn albedo(light: f64, color: [f64; 3]) -> [f64; 3] {
     const ROWS: u32 = 96;
     const COLUMNS: u32 = 48;
@@ -99,7 +99,7 @@ fn a_fibre_reflects_no_more_than_it_gets_and_dark_hair_little() {
         let dark = albedo(light, BROWN);
         assert!(dark[0] < 0.5 * white[0] && dark[2] < dark[0], "dark hair at {light}: {dark:?}");
     }
-    // Mirrored light is white and does not depend on pigment: most of what dark hair gives back.
+    // Mirrored light is white and does not depend on pigment: most of the light from dark hair.
     let dark = albedo(0.0, BROWN);
     assert!((0.1..0.25).contains(&dark[0]), "{dark:?}");
 }
@@ -130,7 +130,7 @@ fn the_highlight_leaves_the_mirror_towards_the_root_and_follows_the_light() {
         let peak = brightest(light, 0.6, |l| l[2]);
         assert!(peak < -light - 0.02 && peak > -light - 0.2, "light at {light}, peak at {peak}");
     }
-    // What comes back through pigment is redder and leans towards the tip.
+    // Light that returns through pigment is redder and leans towards the tip.
     let tint = |view: f64| {
         let l = radiance(0.0, view, 0.0, [0.3, 0.15, 0.06], 0.0);
         l[0] / l[2]

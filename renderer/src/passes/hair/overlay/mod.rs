@@ -4,11 +4,12 @@
 //! positions, frames, light, depth (tested, not written), hdr --overlay--> hdr, velocity (premultiplied over)
 //! ```
 //!
-//! Motion is mixed with that of what lies behind as colours are: where hair moves before a background that stands
+//! Motion is blended with the motion behind, like colour: where hair moves in front of a background that stands
 //! still, history would otherwise be taken from beside the hair.
 //!
 //! A strand of hair is a fraction of a pixel wide: its coverage is computed from its width, so it fades instead of
-//! flickering, and its light is that of `fibre` at each vertex. `uv` of [`rubor_rig::head::Material::Lash`] says where along the lid and along the strand.
+//! flickering, and its light is that of `fibre` at each vertex. `uv` of [`rubor_rig::head::Material::Lash`] gives the
+//! position along the lid and along the strand.
 //!
 //! Does not: sort (hair is dark on dark, a film only adds light), cast shadows.
 

@@ -8,10 +8,10 @@
 //! Theory: normalized diffusion (Christensen and Burley 2015) fitted to each channel of the profile. Radii are
 //! quantiles of the light, angles a golden spiral turned by interleaved gradient noise: the same in every frame of a
 //! still picture. A tap weighs R at its true distance over the density of taps; weights are made to sum to one, so a
-//! tap that meets another surface is left out and the others stand in for it.
+//! tap that meets another surface is left out and the others are scaled up.
 //!
 //! Differs from the source: radii follow the mean of the three channels' quantiles and not the widest channel's, so that
-//! narrow channels get taps too; distance is taken from the tangent plane.
+//! narrow channels get taps too; distance is measured from the tangent plane.
 //!
 //! Fails: noise where light changes fast, with few taps.
 

@@ -1,12 +1,12 @@
-//! `reference-screen`: the profile itself as a two-dimensional kernel, over every pixel that it reaches.
+//! `reference-screen`: the profile itself as a two-dimensional kernel, over every pixel within its reach.
 //!
 //! ```text
 //! irradiance, depth --one pass--> scattered
 //! ```
 //!
-//! What `separable:N` approximates, with the same rules for depth and tilt: the difference is the price of two
-//! one-dimensional passes and of N taps. A pixel weighs the light of its area, from a table of the light in rectangles:
-//! right for steep profiles, and the weights sum to one whatever the size of a pixel.
+//! `separable:N` approximates this with the same rules for depth and tilt: the difference is the error of two
+//! one-dimensional passes and of N taps. The weight of a pixel is the light of its area, from a table of the light in
+//! rectangles: this is right for steep profiles, and the weights sum to one for every pixel size.
 //!
 //! Costs the square of the kernel's width in pixels. A kernel that reaches over more than 256 pixels skips pixels.
 
@@ -17,7 +17,7 @@ use super::gather::{self, Gather, Tap};
 use crate::device::Gpu;
 use crate::device::wgsl::{Module, Program, module};
 
-/// Corners of the table on a side.
+/// Corners of the table per side.
 const SIDE: usize = 192;
 /// Share of the widest channel's light inside of the kernel.
 const COVERAGE: f64 = 0.9995;

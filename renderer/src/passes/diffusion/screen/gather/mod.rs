@@ -28,7 +28,7 @@ pub(crate) struct Params {
     pub(crate) method: [f32; 4],
 }
 
-/// A method that is one such pass.
+/// A method of one such pass.
 pub(crate) struct Gather {
     kernel: Kernel,
     params: wgpu::Buffer,
@@ -41,8 +41,8 @@ pub(crate) fn program(method: Module) -> Program {
 }
 
 impl Gather {
-    /// A pass of a shader with taps, the radius of the kernel, the length that is under half a pixel where the kernel can be
-    /// left out, and numbers of the method.
+    /// A pass of a shader with taps, the radius of the kernel, the length below half a pixel at which the kernel can be
+    /// skipped, and numbers of the method.
     pub(crate) fn new(
         gpu: &Gpu,
         program: &Program,

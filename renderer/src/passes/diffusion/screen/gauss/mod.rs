@@ -1,4 +1,4 @@
-//! `screen-gauss:4`, `screen-gauss:6`: a Gaussian after the other (papers/004 ch. 4), wide ones on smaller images.
+//! `screen-gauss:4`, `screen-gauss:6`: Gaussians one after the other (papers/004 ch. 4), wide ones on smaller images.
 //!
 //! ```text
 //! irradiance --line, line--> G2 --line, line--> G3 ...      each blurs the one before by the difference in variance
@@ -11,17 +11,18 @@
 //! ```
 //!
 //! Theory: the profile as a sum of Gaussians of common variances (eq. 5.3). The narrowest is under a pixel on any
-//! screen: the unblurred image stands for it (section 4.2.1). A Gaussian whose standard deviation is under half a
+//! screen: the unblurred image replaces it (section 4.2.1). A Gaussian whose standard deviation is under half a
 //! pixel is skipped (eq. 4.5); sums stay normalised with the accumulated weights of eq. 4.8.
 //!
 //! A Gaussian runs on the smallest image whose pixels are not wider than [`PIXELS_A_DEVIATION`] allows (Burt and
-//! Adelson 1983, "The Laplacian pyramid as a compact image code": what a wide blur leaves has no finer detail). Halving
-//! and interpolating blur too; that much is taken off the first Gaussian of a level.
+//! Adelson 1983, "The Laplacian pyramid as a compact image code": the result of a wide blur has no finer detail).
+//! Halving and interpolating blur too; that variance is subtracted from the first Gaussian of a level.
 //!
 //! Differs from the source: stretch is the cosine of the surface's tilt, not eqs. 4.1 and 4.2 with tuned constants, the
-//! surface is followed, so that there are no haloes around ears and nose, and all its Gaussians are of full size.
+//! kernel follows the surface, so that there are no haloes around ears and nose; the source runs all Gaussians at full
+//! size.
 //!
-//! Limits: levels are chosen for the farthest head; where several stand at very different distances all pay for it.
+//! Limits: levels are chosen for the farthest head; where several stand at very different distances, all take the cost.
 //! Where strength is a fraction, kernels under half a pixel of their level are as wide as the level's own blur.
 
 use rubor_rig::skin::fit::{Emphasis, RgbGaussian, fit_gaussians};
@@ -43,11 +44,11 @@ pub(crate) fn halve_program() -> Program {
     Program::new(HALVE).with(&[COMMON])
 }
 
-/// Least standard deviation in pixels of the image that a Gaussian runs on: what halving and interpolation blur (the
+/// Least standard deviation in pixels of the image that a Gaussian runs on: the blur of halving and interpolation (the
 /// square root of a third, see [`blur_of_level_px2`]).
 const PIXELS_A_DEVIATION: f64 = 0.577;
 
-/// The smallest image is the view halved this often: one pass halves three times.
+/// Number of halvings from the view to the smallest image: one pass halves three times.
 const MAX_LEVEL: usize = 3;
 
 /// Pixels across of the view that a workgroup halves.
@@ -63,7 +64,7 @@ pub(crate) struct ScreenGauss {
     vertical_with_coarser: [Line; 2],
 }
 
-/// One blur after the other.
+/// One step of the blur.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Step {
     /// Standard deviation that this step adds, mm.
@@ -138,7 +139,7 @@ pub(crate) fn plan(gaussians: &[RgbGaussian], pixels_per_mm: f64) -> Vec<Level> 
         .collect()
 }
 
-/// Adds weights to a sum and says what share of it they are (eq. 4.8).
+/// Adds weights to a sum and returns their share of it (eq. 4.8).
 fn accumulate(so_far: &mut [f64; 3], weights: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| {
         so_far[c] += weights[c];
@@ -186,7 +187,7 @@ impl ScreenGauss {
         lights
     }
 
-    /// Blurs the light of a level: the sum of its Gaussians and of what is `coarser`.
+    /// Blurs the light of a level: the sum of its Gaussians and of the `coarser` level.
     fn record_level(
         &self,
         r: &mut Recorder<'_>,
@@ -199,7 +200,7 @@ impl ScreenGauss {
         let is_small = usize::from(index > 0);
         let mut params: Vec<Params> =
             level.steps.iter().map(|s| Params::new(&taps(s.deviation_mm), s.reached_mm, s.share)).collect();
-        // A level without Gaussians of its own still takes the coarser ones up.
+        // A level without Gaussians of its own still adds the coarser ones.
         if params.is_empty() {
             params.push(Params::new(&[], 0.0, [0.0; 3]));
         }

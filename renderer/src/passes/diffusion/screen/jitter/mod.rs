@@ -4,12 +4,12 @@
 //! irradiance, depth --one pass--> scattered
 //! ```
 //!
-//! One tap is the light that comes out where it went in, six the middle distances, six the wide red scattering.
+//! One tap stands for light that leaves where it entered, six for middle distances, six for the wide red scattering.
 //!
 //! Differs from the source: places and weights follow from the profile and not from a table for one skin. The widest
-//! channel's light is cut into three annuli; each tap stands for a sixth of its annulus.
+//! channel's light is divided into three annuli; each tap stands for a sixth of its annulus.
 //!
-//! Fails where light varies faster than the taps are apart: a shadow edge shows copies of itself.
+//! Fails where light varies faster than the taps are apart: a shadow edge shows ghost copies.
 
 use rubor_rig::skin::profile::Profile;
 

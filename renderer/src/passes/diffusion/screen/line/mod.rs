@@ -1,22 +1,22 @@
-//! One direction of a separable kernel: the pass that `separable` runs twice and `screen-gauss` twice a Gaussian.
+//! One direction of a separable kernel: the pass that `separable` runs twice and `screen-gauss` twice per Gaussian.
 //!
 //! ```text
 //! source (rgb, a = depth), strength, depth --sampled along a line--> target [, sum of Gaussians]
 //! ```
 //!
 //! Theory: Jimenez et al. 2015; papers/004 ch. 6. The kernel is in millimetres on the surface and is projected with the
-//! depth and field of view of each pixel; the surface is followed: a neighbour off the tangent plane of the centre
-//! gives way to the centre.
+//! depth and field of view of each pixel; the kernel follows the surface: the light of a neighbour off the tangent
+//! plane of the centre is replaced by that of the centre.
 //!
 //! Differs from the source: it compares a neighbour with the tangent plane and not with the depth of the centre, so a
 //! tilted cheek keeps its whole kernel, and shortens the kernel with the tilt (papers/004 eqs. 4.1 and 4.2, with the
-//! cosine instead of tuned constants). A tap is one bilinear sample of light and depth together; only where that is
-//! off the plane, and may be a mixture of two surfaces, it is two texels that go by their own depths.
+//! cosine instead of tuned constants). A tap is one bilinear sample of light and depth together; only where it is
+//! off the plane, and may be a mixture of two surfaces, two texels are read and weighted by their own depths.
 //!
 //! Limits: depth beside light is a half, exact to 0.06 mm at 100 mm from the nearest head's middle and to 0.5 mm at 1 m.
 //!
-//! Cost: docs/scatter.md says what bounds it on a GPU, and what else was tried (tiles in workgroup memory, one pixel an
-//! invocation, rows of invocations along the kernel).
+//! Cost: docs/scatter.md explains its bottleneck on a GPU and the alternatives that were tried (tiles in workgroup
+//! memory, one pixel per invocation, rows of invocations along the kernel).
 
 use super::{COMMON, FOLLOW_PER_MM};
 use crate::device::wgsl::{Module, Program, module};
@@ -64,7 +64,7 @@ impl Params {
     }
 }
 
-/// What a pass does with its result besides writing it.
+/// What a pass does with its result in addition to writing it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Sum {
     None,
@@ -90,7 +90,7 @@ pub(crate) struct Line {
     linear: wgpu::Sampler,
 }
 
-/// The images of a pass that sums up.
+/// The images of a pass that accumulates.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Sums<'a> {
     /// The sum before it and after it.
