@@ -394,18 +394,18 @@ fn maps_are_read_as_stored_and_their_headers_are_not_believed() {
     let json = document(&glb);
     let melanin = json["extensions"]["RUBOR_facial_appearance"]["maps"]["melanin"]["image"].as_u64();
     let melanin = melanin.expect("a melanin map") as usize;
-    let expected = from_bytes(Path::new("a.glb"), &glb).unwrap().head;
+    let expected = from_bytes(&glb, Path::new("a.glb")).unwrap().head;
     // An Exif tag that says "lie on your side" (6) says nothing about texture coordinates.
     let exif = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
     let tagged =
         with_image(&glb, melanin, |png| [&png[..33], &png_chunk(b"eXIf", exif), &png[33..]].concat());
-    assert_eq!(from_bytes(Path::new("a.glb"), &tagged).unwrap().head.maps, expected.maps);
+    assert_eq!(from_bytes(&tagged, Path::new("a.glb")).unwrap().head.maps, expected.maps);
     // 40000 x 40000 texels claimed by a few bytes.
     let bomb = with_image(&glb, melanin, |png| {
         let mut header = png[16..29].to_vec();
         header[..8].copy_from_slice(&[0, 0, 0x9c, 0x40, 0, 0, 0x9c, 0x40]);
         [&png[..8], &png_chunk(b"IHDR", &header), &png[33..]].concat()
     });
-    let error = from_bytes(Path::new("a.glb"), &bomb).unwrap_err().to_string();
+    let error = from_bytes(&bomb, Path::new("a.glb")).unwrap_err().to_string();
     assert!(error.contains("melanin") && error.contains("the limit on pixels"), "{error}");
 }

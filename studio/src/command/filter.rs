@@ -117,7 +117,7 @@ enum NonFinite {
 }
 
 /// One file's report.
-#[derive(serde::Serialize)]
+#[derive(Debug, serde::Serialize)]
 struct Done {
     input: PathBuf,
     output: PathBuf,
