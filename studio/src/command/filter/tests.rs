@@ -252,17 +252,19 @@ fn headers_of_an_exr_are_not_believed() {
     let folder = Folder::new();
     let input = folder.path("in.exr");
     write_parts(&input, &[("", &["R", "G", "B"])]);
-    let mut bytes = std::fs::read(&input).unwrap();
-    for name in ["dataWindow", "displayWindow"] {
-        let at = bytes.windows(name.len()).position(|w| w == name.as_bytes()).unwrap();
-        // Name, type `box2i` and size; then the corners, the second at 60000, 60000.
-        let corner = at + name.len() + 1 + 6 + 4 + 8;
-        bytes[corner..corner + 4].copy_from_slice(&60_000i32.to_le_bytes());
-        bytes[corner + 4..corner + 8].copy_from_slice(&60_000i32.to_le_bytes());
-    }
-    std::fs::write(&input, bytes).unwrap();
-    let error = load_stored_exr(&input, &Limits::default()).unwrap_err().to_string();
-    assert!(error.contains("the limit on"), "{error}");
+    let limited = |limits| load_stored_exr(&input, &limits).map(drop).map_err(|e| e.to_string());
+    assert_eq!(limited(Limits::default()), Ok(()));
+    let small = Limits { pixels: 500, ..Limits::default() };
+    assert!(limited(small).unwrap_err().contains("the limit on pixels"));
+    let narrow = Limits { side: 30, ..Limits::default() };
+    assert!(limited(narrow).unwrap_err().contains("the limit on sides"));
+    let poor = Limits { bytes: 10_000, ..Limits::default() };
+    assert!(limited(poor).unwrap_err().contains("the limit on memory"));
+    // Each part fits, all do not.
+    let colors: &[&str] = &["R", "G", "B"];
+    write_parts(&input, &["a", "b", "c", "d", "e"].map(|name| (name, colors)));
+    let few = Limits { bytes: 25_000, ..Limits::default() };
+    assert!(limited(few).unwrap_err().contains("in all"));
 }
 
 #[test]

@@ -45,7 +45,7 @@ pub(crate) struct ChromophoresArgs {
 }
 
 pub(super) fn run(a: &ChromophoresArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
-    let receiver = a.to.head()?;
+    let receiver = a.to.head(notes)?;
     let image = load(&a.albedo, &a.images.options(Purpose::Values), notes)?;
     let mut mask = load_mask(&image, a.mask.as_deref(), notes)?;
     let encoding = if a.linear { AlbedoEncoding::Linear } else { AlbedoEncoding::Automatic };

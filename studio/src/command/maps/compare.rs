@@ -67,6 +67,7 @@ pub(super) fn run(a: &CompareArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
         )));
     }
     let head = a.head.as_ref().map(|path| inputs::head(Some(path))).transpose()?;
+    notes.extend(head.iter().flat_map(|loaded| loaded.notes.iter().cloned()));
     let mut mask = base.mask.and(&target.mask);
     let regions = match &head {
         Some(loaded) => {

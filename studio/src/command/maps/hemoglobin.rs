@@ -52,7 +52,7 @@ pub(crate) struct HemoglobinArgs {
 
 pub(super) fn run(a: &HemoglobinArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
     let (manifest, folder) = manifest(a)?;
-    let receiver = a.to.head()?;
+    let receiver = a.to.head(notes)?;
     let maps = hemoglobin::convert(&manifest, &folder, receiver.as_ref().map(|r| &r.head))?;
     notes.extend(maps.notes.iter().map(|message| Note::new("", message)));
     let summary = |d: &Distribution| {

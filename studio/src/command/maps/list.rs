@@ -65,8 +65,10 @@ fn provenance_key(name: &str) -> &str {
     }
 }
 
-pub(super) fn run(a: &ListArgs) -> Outcome<Value> {
-    let head = inputs::head(a.head.as_deref())?.head;
+pub(super) fn run(a: &ListArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
+    let loaded = inputs::head(a.head.as_deref())?;
+    notes.extend(loaded.notes);
+    let head = loaded.head;
     let row = |(name, map): (String, &Map)| {
         let low = map.values.iter().copied().fold(f32::INFINITY, f32::min);
         let high = map.values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -103,7 +105,9 @@ pub(crate) fn on_card(head: &Head) -> Vec<Value> {
 }
 
 pub(super) fn extract(a: &ExtractArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
-    let head = inputs::head(a.head.as_deref())?.head;
+    let loaded = inputs::head(a.head.as_deref())?;
+    notes.extend(loaded.notes);
+    let head = loaded.head;
     output::folder(&a.output)?;
     let distributions = plain_names(head.maps.distributions.iter().map(|d| d.name.as_str()));
     let zones = plain_names(head.maps.zones.iter().map(|z| z.name.as_str()));

@@ -124,9 +124,9 @@ pub(crate) fn run(arguments: &MapsArgs) -> Outcome {
         MapsCommand::Chromophores(a) => chromophores::run(a, &mut notes),
         MapsCommand::Normals(a) => normals::run(a, &mut notes),
         MapsCommand::Transfer(a) => transfer::run(a, &mut notes),
-        MapsCommand::Predict(a) => predict::run(a),
+        MapsCommand::Predict(a) => predict::run(a, &mut notes),
         MapsCommand::Compare(a) => compare::run(a, &mut notes),
-        MapsCommand::List(a) => list::run(a),
+        MapsCommand::List(a) => list::run(a, &mut notes),
         MapsCommand::Extract(a) => list::extract(a, &mut notes),
         MapsCommand::Lookup(a) => run_lookup(a),
     };

@@ -62,7 +62,7 @@ pub(crate) struct NormalsArgs {
 }
 
 pub(super) fn run(a: &NormalsArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
-    let receiver = a.destination.head()?;
+    let receiver = a.destination.head(notes)?;
     if receiver.is_some() && !matches!(a.to, NormalsTarget::Slopes | NormalsTarget::Wrinkles) {
         return Err(Failure::input("--into: a head holds slopes, expected --to slopes or wrinkles"));
     }

@@ -65,7 +65,7 @@ struct Giver {
 }
 
 pub(super) fn run(a: &TransferArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
-    let receiver = a.to.head()?;
+    let receiver = a.to.head(notes)?;
     let giver = giver(a, notes)?;
     let receiver_mean = match (&receiver, &a.to_mean) {
         (Some(receiver), _) => mean_of(&receiver.head)?,
@@ -119,7 +119,9 @@ fn giver(a: &TransferArgs, notes: &mut Vec<Note>) -> Outcome<Giver> {
     let mut giver = if a.from.is_dir() {
         from_folder(&a.from, notes)?
     } else {
-        let head = inputs::head(Some(&a.from))?.head;
+        let loaded = inputs::head(Some(&a.from))?;
+        notes.extend(loaded.notes);
+        let head = loaded.head;
         let distributions = head.maps.distributions.clone();
         if distributions.is_empty() {
             let found = "found a head without distributions, expected one that has some";
