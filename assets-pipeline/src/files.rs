@@ -4,11 +4,13 @@ use std::collections::HashSet;
 use std::io::Write;
 use std::path::Path;
 
-/// Longest plain name, bytes: a suffix such as `_scale.exr` fits into the 255 that file systems allow.
-const LONGEST_NAME: usize = 200;
+/// Longest name that file systems allow, bytes.
+const LONGEST_NAME: usize = 255;
+/// Longest name that [`plain_names`] gives, bytes: a number and a suffix such as `_scale.exr` fit behind it.
+const LONGEST_STEM: usize = 200;
 
 /// Tells whether a name that comes from a file is a plain file name on every system, so that a path made with it stays
-/// in its folder: no separator, drive or stream of any system, no control character, at most 200 bytes.
+/// in its folder: no separator, drive or stream of any system, no control character, at most 255 bytes.
 pub fn is_plain_name(name: &str) -> bool {
     !matches!(name, "" | "." | "..") && name.len() <= LONGEST_NAME && !name.contains(is_foreign)
 }
@@ -27,16 +29,15 @@ pub fn plain_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<String> 
     let mut number = 0u64;
     let plain = |name: &str| {
         let mut plain: String = name.chars().map(|c| if is_foreign(c) { '_' } else { c }).collect();
-        // Room for a number behind it.
-        plain.truncate(plain.floor_char_boundary(LONGEST_NAME - 20));
+        plain.truncate(plain.floor_char_boundary(LONGEST_STEM));
         if is_plain_name(&plain) { plain } else { "_".into() }
     };
     let unique = |name: &'a str| {
-        let first = if is_plain_name(name) { name.to_owned() } else { plain(name) };
+        let first = plain(name);
         if taken.insert(first.to_lowercase()) {
             return first;
         }
-        let base = plain(name);
+        let base = first;
         loop {
             // One count for all names, so that many equal ones take no time that grows with their square.
             number += 1;

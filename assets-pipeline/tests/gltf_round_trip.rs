@@ -359,3 +359,53 @@ fn the_strongest_shapes_are_kept() {
     assert_eq!(read.shapes, [head.shapes[1].clone()]);
     assert!(export(&head, &Options { shapes: Some(vec![3]), ..options() }).is_err());
 }
+
+/// The file with the bytes of its image number `index` replaced.
+fn with_image(glb: &[u8], index: usize, replace: impl FnOnce(&[u8]) -> Vec<u8>) -> Vec<u8> {
+    let mut json = document(glb);
+    let json_length = u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
+    let mut binary = glb[20 + json_length + 8..].to_vec();
+    let view = json["images"][index]["bufferView"].as_u64().expect("a view") as usize;
+    let number = |name: &str| json["bufferViews"][view][name].as_u64().unwrap_or(0) as usize;
+    let (offset, length) = (number("byteOffset"), number("byteLength"));
+    let image = replace(&binary[offset..offset + length]);
+    json["bufferViews"][view]["byteOffset"] = binary.len().into();
+    json["bufferViews"][view]["byteLength"] = image.len().into();
+    binary.extend(image);
+    binary.resize(binary.len().next_multiple_of(4), 0);
+    json["buffers"][0]["byteLength"] = binary.len().into();
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let chunk = |kind: &[u8; 4], data: &[u8]| [&(data.len() as u32).to_le_bytes()[..], kind, data].concat();
+    let chunks = [chunk(b"JSON", &text), chunk(b"BIN\0", &binary)].concat();
+    [&b"glTF\x02\0\0\0"[..], &(chunks.len() as u32 + 12).to_le_bytes(), &chunks].concat()
+}
+
+fn png_chunk(kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    let mut crc = flate2::Crc::new();
+    crc.update(kind);
+    crc.update(data);
+    [&(data.len() as u32).to_be_bytes()[..], kind, data, &crc.sum().to_be_bytes()].concat()
+}
+
+#[test]
+fn maps_are_read_as_stored_and_their_headers_are_not_believed() {
+    let glb = to_bytes(&head(), &options()).unwrap();
+    let json = document(&glb);
+    let melanin = json["extensions"]["RUBOR_facial_appearance"]["maps"]["melanin"]["image"].as_u64();
+    let melanin = melanin.expect("a melanin map") as usize;
+    let expected = from_bytes(&glb, Path::new("a.glb")).unwrap().head;
+    // An Exif tag that says "lie on your side" (6) says nothing about texture coordinates.
+    let exif = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+    let tagged =
+        with_image(&glb, melanin, |png| [&png[..33], &png_chunk(b"eXIf", exif), &png[33..]].concat());
+    assert_eq!(from_bytes(&tagged, Path::new("a.glb")).unwrap().head.maps, expected.maps);
+    // 40000 x 40000 texels claimed by a few bytes.
+    let bomb = with_image(&glb, melanin, |png| {
+        let mut header = png[16..29].to_vec();
+        header[..8].copy_from_slice(&[0, 0, 0x9c, 0x40, 0, 0, 0x9c, 0x40]);
+        [&png[..8], &png_chunk(b"IHDR", &header), &png[33..]].concat()
+    });
+    let error = from_bytes(&bomb, Path::new("a.glb")).unwrap_err().to_string();
+    assert!(error.contains("melanin") && error.contains("the limit on pixels"), "{error}");
+}

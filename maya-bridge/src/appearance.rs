@@ -5,10 +5,12 @@
 //! channels below each other, at most half a step (1/131070 of the map's range) from the values.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path};
+use std::path::Path;
 
 use glam::Vec3;
 use image::ImageEncoder;
+use rubor_assets::files::is_plain_name;
+use rubor_assets::image_io::{Limits, load_stored};
 use rubor_rig::head::{Distribution, Head, Material, Provenance, SkinMaps, WrinkleZone};
 use rubor_rig::map::Map;
 use serde::{Deserialize, Serialize};
@@ -210,16 +212,16 @@ fn encode(map: &Map) -> Result<Encoded, String> {
 }
 
 fn load(entry: &MapEntry, folder: &Path) -> Result<Map, String> {
-    let file = Path::new(&entry.file);
-    if file.components().count() != 1 || !matches!(file.components().next(), Some(Component::Normal(_))) {
+    if !is_plain_name(&entry.file) {
         return Err(format!("{:?} is no name of a file beside the scene", entry.file));
     }
     let channels = entry.offset.len();
     if channels == 0 || channels != entry.scale.len() || channels > 4 {
         return Err(format!("{channels} offsets and {} scales", entry.scale.len()));
     }
-    let bytes = std::fs::read(folder.join(file)).map_err(|e| format!("{}: {e}", entry.file))?;
-    let image = image::load_from_memory(&bytes).map_err(|e| format!("{}: {e}", entry.file))?.into_luma16();
+    let image = load_stored(&folder.join(&entry.file), &Limits::default())
+        .map_err(|e| std::error::Error::source(&e).map_or_else(|| e.to_string(), |s| format!("{e}: {s}")))?
+        .into_luma16();
     let (width, height) = (image.width(), image.height() / channels as u32);
     if height == 0 || height * channels as u32 != image.height() {
         return Err(format!("{}: {} rows for {channels} channels", entry.file, image.height()));
@@ -232,4 +234,54 @@ fn load(entry: &MapEntry, folder: &Path) -> Result<Map, String> {
         (f64::from(entry.offset[c]) + f64::from(entry.scale[c]) * share) as f32
     };
     Ok(Map { width, height, channels: channels as u32, values: (0..plane * channels).map(value).collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_beside_a_scene_are_plain_files_within_limits() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = folder.path().join("scene");
+        std::fs::create_dir(&inside).unwrap();
+        let map = Map { width: 3, height: 2, channels: 1, values: vec![0.0, 0.1, 0.2, 0.3, 0.4, 1.0] };
+        let (png, offset, scale) = encode(&map).unwrap();
+        // Exif that says "lie on your side" (6): texture coordinates count from the stored corner all the same.
+        let exif = b"eXIfII*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+        let crc = |bytes: &[u8]| {
+            !bytes.iter().fold(!0u32, |crc, byte| {
+                let bit = |c: u32, _| if c & 1 == 1 { (c >> 1) ^ 0xedb8_8320 } else { c >> 1 };
+                (0..8).fold(crc ^ u32::from(*byte), bit)
+            })
+        };
+        let chunk = [&(exif.len() as u32 - 4).to_be_bytes()[..], exif, &crc(exif).to_be_bytes()].concat();
+        let tagged = [&png[..33], &chunk, &png[33..]].concat();
+        let mut header = png[12..29].to_vec();
+        header[4..12].copy_from_slice(&[0, 0, 0x9c, 0x40, 0, 0, 0x9c, 0x40]);
+        let bomb = [&png[..12], &header, &crc(&header).to_be_bytes(), &png[33..]].concat();
+        std::fs::write(inside.join("melanin.png"), &tagged).unwrap();
+        std::fs::write(inside.join("bomb.png"), bomb).unwrap();
+        std::fs::write(folder.path().join("melanin.png"), &png).unwrap();
+        let read = |file: &str| {
+            let entry = MapEntry {
+                role: "melanin".into(),
+                name: String::new(),
+                wrinkle_map: 0,
+                file: file.into(),
+                offset: offset.clone(),
+                scale: scale.clone(),
+            };
+            load(&entry, &inside)
+        };
+        let found = read("melanin.png").unwrap();
+        assert_eq!((found.width, found.height), (3, 2));
+        assert!(found.values.iter().zip(&map.values).all(|(a, b)| (a - b).abs() < 1e-4));
+        assert!(read("bomb.png").unwrap_err().contains("the limit on pixels"));
+        let absolute = folder.path().join("melanin.png").to_string_lossy().into_owned();
+        for name in ["../melanin.png", &absolute, "", "..", "sub\\melanin.png", "C:melanin.png"] {
+            assert!(read(name).unwrap_err().contains("no name of a file beside the scene"), "{name}");
+        }
+        assert!(read("none.png").unwrap_err().contains("none.png"));
+    }
 }

@@ -29,6 +29,8 @@ pub struct LoadedHead {
     pub animation: Option<Sequence>,
     /// Where it comes from, and what the file held.
     pub source: InputFile,
+    /// What the reader left out, guessed or repaired.
+    pub notes: Vec<Note>,
 }
 
 /// The head of a file (`.glb`, `.gltf`), or the built-in one.
@@ -45,6 +47,7 @@ pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
         }
     };
     let imported = import::gltf::from_bytes(&bytes, name)?;
+    let notes = imported.notes.iter().map(|n| Note::new(name.display().to_string(), n.to_string())).collect();
     let rig = match imported.rig {
         None => None,
         Some(value) => {
@@ -65,6 +68,7 @@ pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
         sequence,
         animation: imported.animation,
         source: InputFile { file: path.map(absolute).transpose()?, fingerprint: Fingerprint::of(&bytes) },
+        notes,
     })
 }
 
@@ -144,7 +148,7 @@ pub fn character(
     let skin = synthesize::Options { resolution: CHARACTER_MAPS, ..character.skin() };
     synthesize::synthesize_into_with(&mut head, &skin, step).map_err(Failure::input)?;
     let source = InputFile { file: None, fingerprint: Fingerprint::of(character.name.as_bytes()) };
-    Ok(LoadedHead { head, rig: None, sequence: None, animation: None, source })
+    Ok(LoadedHead { head, rig: None, sequence: None, animation: None, source, notes: Vec::new() })
 }
 
 /// Side of the maps of a character, texels.

@@ -43,6 +43,7 @@ impl<'a> Plan<'a> {
         let sequence = job.lit_sequence();
         let (mut evaluators, mut notes) = (Vec::new(), Vec::new());
         for loaded in heads {
+            notes.extend(loaded.notes.iter().cloned());
             let (evaluator, found) = Evaluator::new(&loaded.head, &job.rig, &sequence)?;
             let about = format!("head {:?}", loaded.head.name);
             notes.extend(found.iter().map(|note| Note::of_rig(&about, note)));

@@ -482,4 +482,37 @@ fn notes_of_one_kind_are_one_line() {
     assert!(output.status.success() && lines.len() == 1, "{said}");
 }
 
+#[test]
+fn what_readers_of_heads_say_is_printed() {
+    let folder = Folder::new();
+    let out = folder.path("head.glb");
+    let import = |from: &str| {
+        let output = rubor(&["import", from, "-o", &out, "--maps", "0"]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{said}");
+        said
+    };
+    std::fs::create_dir(folder.0.path().join("set")).expect("a folder");
+    let points = "v 0 0 0\nv 20 0 0\nv 0 25 0\n";
+    folder.file("set/neutral.obj", format!("{points}f 1 2 3\n").as_bytes());
+    folder.file("set/smile.obj", b"v 0 0 0\nv 20 1 0\nv 0 25 0\n");
+    let said = import(&folder.path("set"));
+    assert!(said.contains("note: ") && said.contains("the order of points alone: smile.obj"), "{said}");
+    // Positions (0, 0, 0), (1, 0, 0), (0, 1, 0) as floats; two targets of one name.
+    let gltf = folder.file(
+        "twice.gltf",
+        br#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "meshes": [{ "extras": { "targetNames": ["smile", "smile"] }, "primitives": [
+            { "attributes": { "POSITION": 0 }, "targets": [{ "POSITION": 0 }, { "POSITION": 1 }] }] }],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] },
+            { "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [0, 0, 0] }],
+        "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+        "buffers": [{ "byteLength": 36,
+            "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }] }"#,
+    );
+    let said = import(&gltf);
+    assert!(said.contains("note: ") && said.contains("smile_1"), "{said}");
+}
+
 const LACKING: &str = r#"{ "fps": 1, "duration": 1, "shapes": { "mouthSmileLeft": 1, "mouthSmileRight": 1, "browInnerUp": 1, "tongueOut": 1 } }"#;

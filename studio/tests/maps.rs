@@ -635,3 +635,172 @@ fn a_new_map_shows_in_the_picture() {
     let output = rubor(&["render", "--inset", "melanin", "-o", &folder.path("frames")]);
     assert_eq!(output.status.code(), Some(2));
 }
+
+/// An EXR of one part with these channels, each with a value for column and row.
+fn exr(folder: &Folder, name: &str, side: usize, channels: &[(&str, &dyn Fn(f32, f32) -> f32)]) -> String {
+    use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage};
+    let channels = channels.iter().map(|(name, value)| {
+        let samples = (0..side * side).map(|i| value((i % side) as f32, (i / side) as f32)).collect();
+        AnyChannel::new(*name, FlatSamples::F32(samples))
+    });
+    let image = Image::from_channels((side, side), AnyChannels::sort(channels.collect()));
+    image.write().to_file(folder.path(name)).expect("a temporary image");
+    folder.path(name)
+}
+
+/// Slopes of a test relief at a texel, and its unit normal.
+fn relief(x: f32, y: f32) -> ([f32; 2], [f32; 3]) {
+    let s = [0.3 * (x / 6.0).sin(), 0.2 * (y / 5.0).cos()];
+    let z = 1.0 / (s[0] * s[0] + s[1] * s[1] + 1.0).sqrt();
+    (s, [s[0] * z, s[1] * z, z])
+}
+
+#[test]
+fn normal_maps_of_every_writing_give_the_same_slopes() {
+    let folder = Folder::new();
+    let out = folder.path("s.exr");
+    let code = |c: usize| move |x: f32, y: f32| 0.5 + 0.5 * relief(x, y).1[c];
+    let signed = |c: usize| move |x: f32, y: f32| relief(x, y).1[c];
+    let lilac = |x: f32, _: f32| 0.4 + 0.01 * x;
+    let alpha = |x: f32, _: f32| if x < 4.0 { 0.0 } else { 1.0 };
+    let or_nan =
+        |c: usize| move |x: f32, y: f32| if x < 4.0 { f32::NAN } else { 0.5 + 0.5 * relief(x, y).1[c] };
+    let files = [
+        exr(&folder, "codes.exr", 32, &[("R", &code(0)), ("G", &code(1)), ("B", &code(2))]),
+        exr(&folder, "words.exr", 32, &[("red", &code(0)), ("green", &code(1)), ("blue", &code(2))]),
+        exr(&folder, "signed.exr", 32, &[("X", &signed(0)), ("Y", &signed(1)), ("Z", &signed(2))]),
+        exr(
+            &folder,
+            "layers.exr",
+            32,
+            &[
+                ("V.Combined.R", &lilac),
+                ("V.Combined.G", &alpha),
+                ("V.Combined.B", &lilac),
+                ("V.Normal.X", &signed(0)),
+                ("V.Normal.Y", &signed(1)),
+                ("V.Normal.Z", &signed(2)),
+            ],
+        ),
+        exr(
+            &folder,
+            "alpha.exr",
+            32,
+            &[("R", &or_nan(0)), ("G", &or_nan(1)), ("B", &or_nan(2)), ("A", &alpha)],
+        ),
+    ];
+    for (file, note) in files.iter().zip([None, None, Some("-1 to 1"), Some("layer"), None]) {
+        let report = done(&["normals", file, "--to", "slopes", "-o", &out]);
+        let notes = report["notes"].to_string();
+        assert_eq!(notes != "null", note.is_some(), "{file}: {notes}");
+        assert!(note.is_none_or(|n| notes.contains(n)), "{file}: {notes}");
+        let slopes = load_image(Path::new(&out)).expect("slopes").map;
+        for (i, s) in slopes.values.chunks_exact(2).enumerate().filter(|(i, _)| i % 32 >= 4) {
+            let expected = relief((i % 32) as f32, (i / 32) as f32).0;
+            let error = (s[0] - expected[0]).abs().max((s[1] - expected[1]).abs());
+            assert!(error < 1e-5, "{file}, texel {i}: {s:?}, expected {expected:?}");
+        }
+        assert!(slopes.values.iter().all(|v| v.is_finite()));
+        // A map less itself is nothing, whatever its numbers mean.
+        done(&["normals", file, "--to", "difference", "--base", &files[0], "-o", &out]);
+        let difference = load_image(Path::new(&out)).expect("a difference").map;
+        let largest = (difference.values.chunks_exact(3).enumerate().filter(|(i, _)| i % 32 >= 4))
+            .flat_map(|(_, d)| d)
+            .fold(0.0f32, |m, v| m.max(v.abs()));
+        assert!(largest < 1e-5 && difference.values.iter().all(|v| v.is_finite()), "{file}: {largest}");
+    }
+    // The user's layer goes before the one whose name fits; other images have none.
+    let layer = |name: &str, to: &str| maps(&["normals", &files[3], "--to", to, "--layer", name, "-o", &out]);
+    assert!(layer("Normal", "slopes").status.success());
+    let said = |output: Output| String::from_utf8_lossy(&output.stderr).into_owned();
+    // Lilac is no normal map: most of its texels are steep.
+    let combined = layer("combined", "slopes");
+    let steep = String::from_utf8_lossy(&combined.stdout).into_owned();
+    assert!(combined.status.success() && !steep.contains("texels_beyond_45_degrees: 0"), "{steep}");
+    let unknown = layer("beauty", "slopes");
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(said(unknown).contains("a layer of the file: \"V.Combined\", \"V.Normal\""));
+    let grey = folder.image("height.png", &map(16, 16, |u, v| u * v), SampleKind::U8);
+    refused(
+        &folder,
+        &["normals", &grey, "--to", "slopes", "--into", &folder.head("h.glb", &head())],
+        &["grey picture"],
+    );
+}
+
+#[test]
+fn layers_of_blood_are_chosen_and_told() {
+    let folder = Folder::new();
+    let blood = |level: f32| move |x: f32, y: f32| level + 0.004 * (x * 0.9).sin() * (y * 0.7).cos();
+    let neutral = blood(0.02);
+    let joy = blood(0.03);
+    let both: [(&str, &dyn Fn(f32, f32) -> f32); 2] = [("neutral.Y", &neutral), ("joy.Y", &joy)];
+    let file = exr(&folder, "blood.exr", 32, &both);
+    let manifest = format!(
+        r#"{{ "neutral": {file:?}, "layer": "neutral", "radius_px": 4, "distributions": [
+            {{ "name": "joy", "file": {file:?}, "layer": "joy" }} ] }}"#
+    );
+    let manifest = folder.text("manifest.json", &manifest);
+    let results = folder.path("results");
+    let report = done(&["hemoglobin", "--manifest", &manifest, "-o", &results]);
+    assert!(report["notes"].is_null(), "{report}");
+    let bias = load_image(&Path::new(&results).join("joy_bias.exr")).expect("a result").map;
+    assert!((bias.sample(0.5, 0.5, 0) - 0.03).abs() < 1e-3, "{}", bias.sample(0.5, 0.5, 0));
+    // Without a name the reader chooses and says so.
+    let target = format!("joy={file}");
+    let report =
+        done(&["hemoglobin", "--neutral", &file, "--target", &target, "--radius", "4", "-o", &results]);
+    assert!(report["notes"].to_string().contains("the file also holds"), "{report}");
+    let flag = ["hemoglobin", "--neutral", &file, "--target", &target, "--radius", "4", "--layer", "joy"];
+    let report = done(&[&flag[..], &["-o", &results]].concat());
+    assert!(report["notes"].is_null(), "{report}");
+    let compared = done(&[
+        "compare",
+        "--neutral",
+        &file,
+        "--target",
+        &file,
+        "--radius",
+        "4",
+        "--size",
+        "16",
+        "--layer",
+        "joy",
+    ]);
+    assert!(compared["notes"].is_null());
+    let compared = maps(&["compare", "--neutral", &file, "--target", &file, "--radius", "4", "--size", "16"]);
+    let said = String::from_utf8_lossy(&compared.stderr).into_owned();
+    assert_eq!(said.matches("note: ").count(), 1, "{said}");
+}
+
+#[test]
+fn names_of_a_head_write_nothing_outside_of_the_folder() {
+    let folder = Folder::new();
+    let victim = folder.path("victim");
+    std::fs::create_dir(&victim).expect("a folder");
+    let mut evil = head();
+    let absolute = format!("{victim}/absolute");
+    let distribution = evil.maps.distributions.remove(0);
+    for name in ["../victim/evil", &absolute, "a/b", "a\\b"] {
+        evil.maps.distributions.push(Distribution { name: name.into(), ..distribution.clone() });
+    }
+    evil.maps.zones[0].name = "../../victim/zone".into();
+    let evil = folder.head("evil.glb", &evil);
+    let mean = folder.image("mean.exr", &flat(32, 0.02), SampleKind::F32);
+    let out = folder.path("out");
+    let report = done(&["transfer", "--from", &evil, "--to-mean", &mean, "-o", &out]);
+    assert!(report["notes"].to_string().contains(".._victim_evil"), "{report}");
+    let all = folder.path("all");
+    let report = done(&["extract", &evil, "-o", &all]);
+    assert!(report["notes"].to_string().contains("zone"), "{report}");
+    assert_eq!(std::fs::read_dir(&victim).expect("the folder").count(), 0);
+    let written = std::fs::read_dir(&out).expect("results").count();
+    assert_eq!(written, 9, "two files per distribution and the mean");
+    for name in ["a_b_scale.exr", "a_b_1_bias.exr", ".._victim_evil_scale.exr"] {
+        assert!(Path::new(&out).join(name).is_file() && Path::new(&all).join(name).is_file(), "{name}");
+    }
+    assert_eq!(std::fs::read_dir(folder.0.path()).expect("the folder").count(), 5);
+    let name = format!("{absolute}=x.png");
+    let arguments = ["hemoglobin", "--neutral", &mean, "--target", &name, "--into", &evil];
+    refused(&folder, &arguments, &["a name of its own"]);
+}

@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 
 use super::ConvertError;
 use super::skin_texels::{SkinTexels, require_layout};
-use crate::image_io::{ImageError, SampleKind, load_image, save_image};
+use crate::files::{is_plain_name, plain_names};
+use crate::image_io::{ImageError, ReadOptions, SampleKind, load_image, load_image_with, save_image};
 
 /// Share of mapped texels outside of 0..0.32 above which a map is refused: its unit is then another one.
 const MOST_CLAMPED: f64 = 0.5;
@@ -92,6 +93,9 @@ pub struct HemoglobinSource {
     /// Calibration where it differs from that of the manifest.
     #[serde(default)]
     pub calibration: Option<Calibration>,
+    /// Layer of an EXR where it differs from that of the manifest.
+    #[serde(default)]
+    pub layer: Option<String>,
 }
 
 /// What to convert: the manifest of `rubor maps hemoglobin`.
@@ -110,6 +114,9 @@ pub struct HemoglobinManifest {
     /// Of every map without its own.
     #[serde(default)]
     pub calibration: Calibration,
+    /// Layer of each EXR without its own (see [`ReadOptions::layer`]); the mask is read without it.
+    #[serde(default)]
+    pub layer: Option<String>,
     /// Radius r of the disk, texels of the neutral map; a 64th of its larger side without.
     #[serde(default)]
     pub radius_px: Option<u32>,
@@ -174,12 +181,16 @@ pub struct Fractions {
 /// # Errors
 /// An image that is not grey or not finite where mapped; a calibration that is not finite, or that sends more than half
 /// of the texels out of 0..0.32.
-pub fn read_fractions(file: &Path, calibration: Calibration) -> Result<Fractions, ConvertError> {
+pub fn read_fractions(
+    file: &Path,
+    calibration: Calibration,
+    options: &ReadOptions,
+) -> Result<Fractions, ConvertError> {
     if !(calibration.gain.is_finite() && calibration.offset.is_finite()) {
         let found = format!("gain {}, offset {}", calibration.gain, calibration.offset);
         return Err(ConvertError::argument(file.display().to_string(), found, "finite numbers"));
     }
-    let image = load_image(file)?;
+    let image = load_image_with(file, options)?;
     let mask = image.mask();
     image.require_finite(&mask)?;
     let mut map = image.require_grey()?;
@@ -224,10 +235,7 @@ pub fn convert(
     }
     for (i, source) in manifest.distributions.iter().enumerate() {
         let name = &source.name;
-        if name.is_empty()
-            || name.contains(['/', '\\'])
-            || manifest.distributions[..i].iter().any(|s| s.name == *name)
-        {
+        if !is_plain_name(name) || manifest.distributions[..i].iter().any(|s| s.name == *name) {
             let at = format!("distribution {i}");
             let expected = "a name of its own that can be a file's";
             return Err(ConvertError::argument(at, format!("name {name:?}"), expected));
@@ -269,7 +277,9 @@ pub fn convert(
     for source in &manifest.distributions {
         let calibration = source.calibration.unwrap_or(manifest.calibration);
         let file = folder.join(&source.file);
-        let target = read_fractions(&file, calibration)?;
+        let layer = source.layer.as_ref().or(manifest.layer.as_ref()).cloned();
+        let options = ReadOptions { layer, ..ReadOptions::default() };
+        let target = read_fractions(&file, calibration, &options)?;
         clamped_texels += target.clamped_texels;
         note(&source.file.display().to_string(), &target.notes);
         let target_mask = target_mask(&file, &target, &mask, head)?;
@@ -314,7 +324,8 @@ fn neutral_of(
 ) -> Result<(Fractions, String), ConvertError> {
     if let Some(file) = &manifest.neutral {
         let file = folder.join(file);
-        return Ok((read_fractions(&file, manifest.calibration)?, file.display().to_string()));
+        let options = ReadOptions { layer: manifest.layer.clone(), ..ReadOptions::default() };
+        return Ok((read_fractions(&file, manifest.calibration, &options)?, file.display().to_string()));
     }
     let expected = "a neutral map, or a head that has one";
     let Some(head) = head else { return Err(ConvertError::argument("neutral", "nothing", expected)) };
@@ -385,9 +396,10 @@ pub fn write(maps: &HemoglobinMaps, folder: &Path) -> Result<Vec<PathBuf>, Conve
     };
     save("neutral.exr".into(), &maps.neutral)?;
     save("neutral_mean.exr".into(), &maps.neutral_mean)?;
-    for d in &maps.distributions {
-        save(format!("{}_scale.exr", d.name), &d.scale)?;
-        save(format!("{}_bias.exr", d.name), &d.bias)?;
+    let names = plain_names(maps.distributions.iter().map(|d| d.name.as_str()));
+    for (name, d) in names.iter().zip(&maps.distributions) {
+        save(format!("{name}_scale.exr"), &d.scale)?;
+        save(format!("{name}_bias.exr"), &d.bias)?;
     }
     Ok(written)
 }

@@ -98,6 +98,21 @@ fn layer(name: String, members: &[(Meaning, usize)]) -> Layer {
     Layer { name, values, alpha, unread }
 }
 
+/// Tells whether the values of a layer are a colour or grey, and no vector.
+pub(super) fn is_color(names: &[String], layer: &Layer) -> bool {
+    let meanings: Vec<Meaning> = layer.values.iter().map(|p| meaning(split(&names[*p]).1)).collect();
+    matches!(meanings[..], [Meaning::Red, Meaning::Green, Meaning::Blue] | [Meaning::Y | Meaning::Grey])
+}
+
+/// Tells by the last word of its name whether a layer holds data and no picture, whatever its channels are called.
+pub(super) fn is_data(last: &str) -> bool {
+    const DATA: [&str; 14] = [
+        "depth", "z", "zdepth", "uv", "st", "vector", "velocity", "motion", "position", "p", "pworld", "id",
+        "mist", "mask",
+    ];
+    rank_as_normals(last) == 0 || DATA.contains(&last) || last.contains("crypto") || last.starts_with("index")
+}
+
 /// The last word of a layer's name, lower case: `combined` of `ViewLayer.Combined`.
 pub(super) fn last_word(name: &str) -> String {
     name.rsplit(['.', '/', ':']).next().unwrap_or(name).to_ascii_lowercase()
@@ -147,6 +162,30 @@ mod tests {
         }
         for names in [["X", "Y", "Z"], ["N.x", "N.y", "N.z"], ["Normal_X", "Normal_Y", "Normal_Z"]] {
             assert_eq!(layers_of(&names)[0].values, [0, 1, 2], "{names:?}");
+        }
+    }
+
+    #[test]
+    fn pictures_are_told_from_data() {
+        let is_picture = |names: &[&str]| {
+            let owned: Vec<String> = names.iter().map(|n| (*n).to_owned()).collect();
+            let layer = &layers(&owned)[0];
+            is_color(&owned, layer) && !is_data(&last_word(&layer.name))
+        };
+        for names in
+            [&["B", "G", "R"][..], &["Y"], &["A", "luma"], &["V.DiffCol.B", "V.DiffCol.G", "V.DiffCol.R"]]
+        {
+            assert!(is_picture(names), "{names:?}");
+        }
+        for names in [
+            &["X", "Y", "Z"][..],
+            &["V.Normal.B", "V.Normal.G", "V.Normal.R"],
+            &["CryptoObject00.b", "CryptoObject00.g", "CryptoObject00.r"],
+            &["V.Depth.Y"],
+            &["hemoglobin"],
+            &["G", "R"],
+        ] {
+            assert!(!is_picture(names), "{names:?}");
         }
     }
 

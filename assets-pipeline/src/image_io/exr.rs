@@ -36,11 +36,11 @@ pub(super) struct ExrImage {
 }
 
 /// A layer and the part that holds it.
-struct Choice {
-    part: usize,
+pub(super) struct Choice {
+    pub(super) part: usize,
     /// Name for messages: part and layer.
-    title: String,
-    layer: Layer,
+    pub(super) title: String,
+    pub(super) layer: Layer,
 }
 
 pub(super) fn read(file: &Path, bytes: &[u8], options: &ReadOptions) -> Result<ExrImage, ImageError> {
@@ -88,15 +88,13 @@ pub(super) fn read(file: &Path, bytes: &[u8], options: &ReadOptions) -> Result<E
     Ok(ExrImage { image, is_cube_map })
 }
 
-/// The layer that is asked for or that its name speaks for; notes say what else there is.
-fn choose(
-    file: &Path,
-    headers: &[Header],
-    options: &ReadOptions,
-) -> Result<(Choice, Vec<String>), ImageError> {
-    let names_of = |header: &Header| -> Vec<String> {
-        header.channels.list.iter().map(|c| c.name.to_string()).collect()
-    };
+/// Names of the channels of a part.
+pub(super) fn names_of(header: &Header) -> Vec<String> {
+    header.channels.list.iter().map(|c| c.name.to_string()).collect()
+}
+
+/// The layers of all parts, but for those of alpha alone.
+pub(super) fn choices(headers: &[Header]) -> Vec<Choice> {
     let mut choices: Vec<Choice> = Vec::new();
     for (part, header) in headers.iter().enumerate() {
         let part_name =
@@ -119,6 +117,16 @@ fn choose(
             choices.push(Choice { part, title, layer });
         }
     }
+    choices
+}
+
+/// The layer that is asked for or that its name speaks for; notes say what else there is.
+fn choose(
+    file: &Path,
+    headers: &[Header],
+    options: &ReadOptions,
+) -> Result<(Choice, Vec<String>), ImageError> {
+    let mut choices = choices(headers);
     let titles = |choices: &[Choice]| {
         let quoted =
             |c: &Choice| if c.title.is_empty() { "(unnamed)".into() } else { format!("{:?}", c.title) };

@@ -19,6 +19,7 @@ use rubor_rig::map::Map;
 use rubor_rig::mask::Mask;
 
 pub use self::limits::Limits;
+pub use self::stored::{PictureLayer, StoredExr, load_stored_exr};
 pub use self::write::save_image;
 
 mod channels;
@@ -27,6 +28,7 @@ mod limits;
 mod orientation;
 mod radiance;
 mod raster;
+mod stored;
 mod tiff;
 mod write;
 
@@ -293,6 +295,14 @@ pub fn load_picture(file: &Path, limits: &Limits) -> Result<LoadedPicture, Image
 /// Bytes that are no PNG, JPEG, WebP or TIFF, or beyond the limits.
 pub fn decode_stored(name: &Path, bytes: &[u8], limits: &Limits) -> Result<DynamicImage, ImageError> {
     Ok(contained(name, || raster::decode(name, bytes, limits, raster::Turn::AsStored))?.0)
+}
+
+/// Reads a picture as stored (see [`decode_stored`]).
+///
+/// # Errors
+/// As for [`decode_stored`]; a file that is missing, no regular file or beyond the limits.
+pub fn load_stored(file: &Path, limits: &Limits) -> Result<DynamicImage, ImageError> {
+    decode_stored(file, &read_file(file, limits)?, limits)
 }
 
 /// An image for [`crate::environment`], and whether its header says that it is a cube map.

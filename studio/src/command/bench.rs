@@ -52,6 +52,7 @@ impl Purpose for Timing {
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let all = arguments.settings.all()?;
     let loaded = inputs::head(arguments.head.as_deref())?;
+    console::notes(&loaded.notes);
     let rig = inputs::rig(None, loaded.rig.clone())?;
     let (mut sequence, notes) = inputs::sequence(arguments.sequence.as_deref())?;
     console::notes(&notes);

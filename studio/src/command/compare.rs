@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use rubor::measure::difference::{Difference, of_files};
+use rubor::measure::difference::{Compared, Difference, of_files};
 use rubor::{Failure, Outcome, output};
 use rubor_assets::compare::flip;
 use serde::Serialize;
 
-use super::print_json;
+use super::{console, print_json};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         let name = arguments.reference.display().to_string();
         vec![(name, arguments.test.clone(), arguments.reference.clone())]
     };
-    let mut differences = Vec::new();
+    let (mut differences, mut notes) = (Vec::new(), Vec::new());
     for (name, test, reference) in pairs {
         let picture = arguments.output.as_ref().map(|o| match is_folder {
             true => o.join(Path::new(&name).with_extension("png")),
@@ -58,7 +58,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         if is_folder && let Some(folder) = &arguments.output {
             output::folder(folder)?;
         }
-        let (difference, visible) = of_files(&test, &reference, ppd)?;
+        let Compared { difference, picture: visible, notes: found } = of_files(&test, &reference, ppd)?;
+        notes.extend(found);
         if let Some(path) = picture {
             output::save_picture(&path, &visible)?;
         }
@@ -73,6 +74,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         }
         differences.push(Row { name, difference });
     }
+    console::notes(&notes);
     if arguments.json {
         print_json(&differences)?;
     }

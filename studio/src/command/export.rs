@@ -90,6 +90,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         )));
     }
     let loaded = inputs::head(arguments.head.as_deref())?;
+    console::notes(&loaded.notes);
     let rig = inputs::rig(arguments.rig.as_deref(), loaded.rig)?;
     let head = &loaded.head;
     let sequence = match &arguments.sequence {

@@ -1,12 +1,12 @@
 //! `rubor filter`: antialiases finished images.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use exr::prelude::{FlatImage, FlatSamples, WritableImage, f16, read_all_flat_layers_from_file};
-use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
+use exr::prelude::{FlatSamples, WritableImage, f16};
+use image::{ColorType, DynamicImage, ImageFormat};
 use rubor::studio::open_device;
+use rubor_assets::image_io::{Limits, StoredExr, load_picture, load_stored_exr};
 use rubor_renderer::antialias::reference::Picture;
 use rubor_renderer::antialias::{
     Alpha, AntialiasError, EdgeSource, Encoding, Filter, Mode, Preset, Settings,
@@ -14,7 +14,8 @@ use rubor_renderer::antialias::{
 use rubor_renderer::settings::AntialiasMethod;
 use rubor_renderer::{Gpu, native};
 
-use super::console::Progress;
+use super::console::{self, Progress};
+use rubor::notes::Note;
 use rubor::output;
 use rubor::{Failure, Fault, Outcome, Watch};
 
@@ -116,7 +117,7 @@ enum NonFinite {
 }
 
 /// One file's report.
-#[derive(serde::Serialize)]
+#[derive(Debug, serde::Serialize)]
 struct Done {
     input: PathBuf,
     output: PathBuf,
@@ -137,7 +138,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         match filters.file(input, output) {
             Ok(report) => done.push(report),
             Err(failure) if many => failures.push(failure),
-            Err(failure) => return Err(failure),
+            Err(failure) => {
+                console::notes(&filters.notes);
+                return Err(failure);
+            }
         }
         if let Some(progress) = &mut progress {
             progress.step();
@@ -146,6 +150,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     if let Some(mut progress) = progress {
         progress.end();
     }
+    console::notes(&filters.notes);
     if arguments.json {
         super::print_json(&done)?;
     } else {
@@ -239,6 +244,8 @@ struct Filters<'a> {
     light: Filter<'a>,
     stage: Stage,
     non_finite: NonFinite,
+    /// What the readers of the images chose, left out or turned.
+    notes: Vec<Note>,
 }
 
 impl<'a> Filters<'a> {
@@ -269,6 +276,7 @@ impl<'a> Filters<'a> {
             light: Filter::new(gpu, light).map_err(Failure::input)?,
             stage: arguments.stage,
             non_finite: arguments.non_finite,
+            notes: Vec::new(),
         })
     }
 
@@ -280,9 +288,22 @@ impl<'a> Filters<'a> {
         if extension(input) == "exr" { self.exr(input, target) } else { self.image(input, target) }
     }
 
-    /// Images of whole numbers. Number of channels and depth are kept; palettes become colours.
+    fn note(&mut self, file: &Path, found: &[String]) {
+        self.notes.extend(found.iter().map(|message| Note::new(file.display().to_string(), message)));
+    }
+
+    /// Images of whole numbers, upright. Number of channels and depth are kept; palettes become colours.
     fn image(&mut self, input: &Path, target: &Path) -> Outcome<Done> {
-        let image = decode(input)?;
+        let picture = load_picture(input, &Limits::default())?;
+        self.note(input, &picture.notes);
+        let image = picture.image;
+        if matches!(image.color(), ColorType::Rgb32F | ColorType::Rgba32F) {
+            return Err(Failure::input(format!(
+                "{}: found floats, expected whole numbers of 8 or 16 bits",
+                input.display()
+            ))
+            .hint("light is filtered in an OpenEXR (.exr)"));
+        }
         let (width, height) = (image.width() as usize, image.height() as usize);
         let picture = || {
             let pixels = image.to_rgba32f();
@@ -334,10 +355,10 @@ impl<'a> Filters<'a> {
         })
     }
 
-    /// Scene-linear images. Channels R, G, B (or Y) and A of each part are filtered, all others are kept.
+    /// Scene-linear images. The layers that are pictures are filtered, all others are kept.
     fn exr(&mut self, input: &Path, target: &Path) -> Outcome<Done> {
-        let mut image: FlatImage = read_all_flat_layers_from_file(input)
-            .map_err(|e| Failure::input(format!("{}: cannot read this EXR image: {e}", input.display())))?;
+        let StoredExr { mut image, pictures, notes } = load_stored_exr(input, &Limits::default())?;
+        self.note(input, &notes);
         let mut report = Done {
             input: input.into(),
             output: target.into(),
@@ -346,17 +367,11 @@ impl<'a> Filters<'a> {
             changed_pixels: 0,
             replaced_values: 0,
         };
-        let mut found = false;
-        for layer in &mut image.layer_data {
+        for place in pictures {
+            let layer = &mut image.layer_data[place.part];
             let (width, height) = (layer.size.x(), layer.size.y());
             let channels = &mut layer.channel_data.list;
-            let place = |name: &str| channels.iter().position(|channel| channel.name.eq(name));
-            let color = match (place("R"), place("G"), place("B"), place("Y")) {
-                (Some(r), Some(g), Some(b), _) => [r, g, b],
-                (_, _, _, Some(y)) => [y; 3],
-                _ => continue,
-            };
-            let alpha = place("A");
+            let (color, alpha) = (place.color, place.alpha);
             let values = |index: usize| -> Vec<f32> { channels[index].sample_data.values_as_f32().collect() };
             let [r, g, b] = color.map(values);
             let cover = alpha.map(values);
@@ -373,7 +388,6 @@ impl<'a> Filters<'a> {
             };
             report.replaced_values += self.make_finite(&mut picture, input)?;
             (report.width, report.height) = (width, height);
-            found = true;
             if self.stage != Stage::Result {
                 return save_stage(self.gpu, &mut self.light, self.stage, &picture, input, target);
             }
@@ -387,18 +401,6 @@ impl<'a> Filters<'a> {
             for (index, channel) in targets {
                 set_samples(&mut channels[index].sample_data, |i| result.pixels[i][channel]);
             }
-        }
-        if !found {
-            let names: Vec<String> = image
-                .layer_data
-                .iter()
-                .flat_map(|layer| layer.channel_data.list.iter().map(|channel| channel.name.to_string()))
-                .collect();
-            return Err(Failure::input(format!(
-                "{}: expected channels R, G, B or Y, found {}",
-                input.display(),
-                names.join(", ")
-            )));
         }
         output::commit(target, |partial| image.write().to_file(partial).map_err(std::io::Error::other))?;
         Ok(report)
@@ -439,20 +441,6 @@ fn set_samples(samples: &mut FlatSamples, value: impl Fn(usize) -> f32) {
             values.iter_mut().enumerate().for_each(|(i, v)| *v = value(i).round() as u32);
         }
     }
-}
-
-/// What the file holds decides the format, not its name.
-fn decode(path: &Path) -> Outcome<DynamicImage> {
-    let unreadable = |e: &dyn std::fmt::Display| {
-        Failure::input(format!("{}: cannot read this image: {e}", path.display()))
-    };
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .and_then(|mut file| file.read_to_end(&mut bytes))
-        .map_err(|e| unreadable(&e))?;
-    let reader =
-        ImageReader::new(std::io::Cursor::new(&bytes)).with_guessed_format().map_err(|e| unreadable(&e))?;
-    reader.decode().map_err(|e| unreadable(&e))
 }
 
 fn first_channels<T: image::Primitive, const N: usize, P: image::Pixel<Subpixel = T>>(

@@ -10,8 +10,9 @@ use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_rig::timeline::Sequence;
 
-use super::console::Progress;
+use super::console::{self, Progress};
 use rubor::Watch;
+use rubor::notes::Note;
 use rubor::{Failure, Outcome};
 
 #[derive(clap::Args)]
@@ -140,9 +141,15 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
                     ..import::obj_set::Options::default()
                 };
                 options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
-                import::obj_set::import(&options)?
+                let set = import::obj_set::read(&options)?;
+                let about = source.display().to_string();
+                console::notes(
+                    &set.notes.iter().map(|n| Note::new(&about, n.to_string())).collect::<Vec<_>>(),
+                );
+                set.head
             } else {
                 let loaded = rubor::inputs::head(Some(source))?;
+                console::notes(&loaded.notes);
                 if let Some(path) = &arguments.sequence {
                     let found = loaded.sequence.as_ref().or(loaded.animation.as_ref());
                     write_sequence(found, source, path)?;

@@ -104,6 +104,7 @@ fn import(arguments: &Import) -> Outcome {
 fn export(arguments: &Export) -> Outcome {
     require_extension(&arguments.output, "ma")?;
     let loaded = inputs::head(arguments.head.as_deref())?;
+    console::notes(&loaded.notes);
     let rig = inputs::rig(arguments.rig.as_deref(), loaded.rig)?;
     let sequence = match &arguments.sequence {
         Some(path) => {

@@ -9,6 +9,7 @@ use rubor_rig::color::srgb_decode;
 use serde::Serialize;
 
 use crate::error::{Failure, Outcome};
+use crate::notes::Note;
 
 /// One pair of images.
 #[derive(Clone, Debug, Serialize)]
@@ -25,16 +26,24 @@ pub struct Difference {
     pub flip_99: f64,
 }
 
-/// Compares two image files; the second is right. With it a picture of the visible differences.
+/// What a comparison of two files gives.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// How far they are apart.
+    pub difference: Difference,
+    /// The visible differences.
+    pub picture: image::RgbImage,
+    /// What the readers of the images chose, left out or turned.
+    pub notes: Vec<Note>,
+}
+
+/// Compares two image files; the second is right.
 ///
 /// # Errors
 /// A file that is no image; images of different sizes; values that are not finite.
-pub fn of_files(
-    test: &Path,
-    reference: &Path,
-    pixels_per_degree: f64,
-) -> Outcome<(Difference, image::RgbImage)> {
-    let ((t, t_is_light), (r, r_is_light)) = (read(test)?, read(reference)?);
+pub fn of_files(test: &Path, reference: &Path, pixels_per_degree: f64) -> Outcome<Compared> {
+    let mut notes = Vec::new();
+    let ((t, t_is_light), (r, r_is_light)) = (read(test, &mut notes)?, read(reference, &mut notes)?);
     if (t.width, t.height) != (r.width, r.height) {
         return Err(Failure::input(format!(
             "{}: found {}x{} pixels, expected {}x{} as in {}",
@@ -59,7 +68,7 @@ pub fn of_files(
         flip_mean,
         flip_99,
     };
-    Ok((difference, picture))
+    Ok(Compared { difference, picture, notes })
 }
 
 /// A map of FLIP as a picture: black, violet, orange, yellow, white, each step brighter than the last.
@@ -90,13 +99,18 @@ pub(crate) fn pixels(image: &Image) -> Pixels {
 }
 
 /// Linear pixels, and whether the file holds light (floats) and not display values.
-fn read(path: &Path) -> Outcome<(Pixels, bool)> {
+fn read(path: &Path, notes: &mut Vec<Note>) -> Outcome<(Pixels, bool)> {
     let image = load_image(path)?;
+    notes.extend(image.notes.iter().map(|message| Note::new(path.display().to_string(), message)));
     let is_light = image.kind == SampleKind::F32;
     let map = &image.map;
     let texel = |i: usize| -> [f32; 3] {
         let at = &map.values[i * map.channels as usize..];
-        let rgb = if map.channels >= 3 { [at[0], at[1], at[2]] } else { [at[0]; 3] };
+        let rgb = match map.channels {
+            1 => [at[0]; 3],
+            2 => [at[0], at[1], 0.0],
+            _ => [at[0], at[1], at[2]],
+        };
         if is_light { rgb } else { rgb.map(srgb_decode) }
     };
     let (width, height) = (map.width as usize, map.height as usize);

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod chart;
 pub mod difference;
 
+use rubor_assets::files::plain_names;
 use rubor_renderer::settings::{Leaf, Settings, leaves};
 use serde_json::Value;
 
@@ -52,9 +53,10 @@ pub(crate) fn names(all: &[Settings], always: &[&str]) -> Vec<String> {
         .collect()
 }
 
-/// A file name for the name of settings.
+/// A file name for the name of settings; the name of a profile comes from a file and may be any text.
 pub fn file_name(name: &str) -> String {
-    name.replace(", ", "_").replace([':', ' '], "-")
+    let name = name.replace(", ", "_").replace([':', ' '], "-");
+    plain_names([name.as_str()]).concat()
 }
 
 #[cfg(test)]
@@ -83,6 +85,7 @@ mod tests {
             ]
         );
         assert_eq!(file_name("separable:5, shadow-size 64"), "separable-5_shadow-size-64");
+        assert_eq!(file_name("../victim/evil"), ".._victim_evil");
         assert!(product(&Settings::default(), &[change("quality", "shadowSize", &[1.into()])]).is_err());
     }
 }

@@ -39,6 +39,9 @@ struct Curve {
     limited: usize,
 }
 
+/// Largest error of the length of a recording whose times are rounded to milliseconds, seconds, with some room.
+const ROUNDING_S: f64 = 1.1e-3;
+
 /// Tracks of a recording at `fps` frames a second (none: the recording's own rate).
 ///
 /// # Errors
@@ -66,8 +69,9 @@ pub fn to_sequence(
         let expected = format!("a time within the {} s of the recording", recording.length_s());
         return Err(wrong("neutral", found, &expected));
     }
-    // Half a step of slack: a take of n samples at the sequence's rate has n frames in spite of rounding.
-    let count = (recording.length_s() * fps + 1e-3).floor() as usize + 1;
+    // A take of n samples at the sequence's rate has n frames although its times may be rounded to milliseconds.
+    let slack = (ROUNDING_S * fps).clamp(1e-3, 0.5);
+    let count = (recording.length_s() * fps + slack).floor() as usize + 1;
     if count > MOST_SAMPLES {
         let gap = times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let found = format!("{count} frames at {fps} a second, samples up to {gap:.1} s apart");

@@ -1,5 +1,7 @@
 //! Files that carry `RUBOR_facial_appearance`: everything as it was written.
 
+use std::path::Path;
+
 use glam::{Vec2, Vec3};
 use gltf::Semantic;
 use rubor_rig::head::{
@@ -12,6 +14,7 @@ use super::motion::{Driver, Motion};
 use super::{ImportedHead, accessor, names};
 use crate::error::ImportError;
 use crate::facial_appearance::{ChannelLayout, FacialAppearance, MapEntries, MapEntry, NAME, VERSION};
+use crate::image_io::{Limits, decode_stored};
 
 pub(super) fn read(
     document: &Document,
@@ -214,8 +217,8 @@ fn map(
         return Err(document.fail(&at, v.to_string(), "finite offset and scale"));
     }
     let bytes = document.image(entry.image)?;
-    let picture = image::load_from_memory(&bytes)
-        .map_err(|e| document.fail(&at, e.to_string(), "a PNG or JPEG image"))?;
+    let picture = decode_stored(Path::new(&at), &bytes, &Limits::default())
+        .map_err(|e| document.fail(&at, e.to_string(), "a PNG or JPEG image within the limits"))?;
     let (width, height) = (picture.width(), picture.height());
     let (step, starts) = match entry.layout {
         ChannelLayout::First => (1, vec![0]),

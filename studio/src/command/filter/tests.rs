@@ -1,6 +1,7 @@
 use std::io::Write;
 
 use super::*;
+use exr::prelude::read_all_flat_layers_from_file;
 use image::{GrayAlphaImage, GrayImage, Rgb, RgbImage, RgbaImage};
 
 /// A folder of its own for a test, removed at its end.
@@ -167,6 +168,138 @@ fn exr_keeps_other_channels_and_light_over_one() {
     assert!(before.iter().zip(&after).filter(|(a, b)| a != b).count() < 150);
 }
 
+/// Parts with a name and channels, all of 31 x 17 texels and of this light, each channel at a scale of its own.
+fn write_parts(path: &Path, parts: &[(&str, &[&str])]) {
+    use exr::prelude::*;
+    let light = |i: usize| if white((i % 31) as u32, (i / 31) as u32) { 4.0 } else { 0.01 };
+    let layers = parts.iter().map(|(part, names)| {
+        let channel = |(c, name): (usize, &&str)| {
+            let samples = (0..31 * 17).map(|i| light(i) * (c + 1) as f32).collect();
+            AnyChannel::new(*name, FlatSamples::F32(samples))
+        };
+        let channels = AnyChannels::sort(names.iter().enumerate().map(channel).collect());
+        Layer::new((31, 17), LayerAttributes::named(*part), Encoding::SMALL_LOSSLESS, channels)
+    });
+    let window = IntegerBounds::new(Vec2(0, 0), Vec2(31, 17));
+    let image =
+        Image { attributes: ImageAttributes::new(window), layer_data: layers.collect::<SmallVec<_>>() };
+    image.write().to_file(path).unwrap();
+}
+
+#[test]
+fn colours_of_an_exr_are_found_by_meaning_and_data_are_kept() {
+    if !has_gpu() {
+        return;
+    }
+    let folder = Folder::new();
+    let target = folder.path("out.exr");
+    let cases: [(&[(&str, &[&str])], &[&str], bool); 5] = [
+        (&[("", &["red", "green", "blue"])], &["red", "green", "blue"], false),
+        (
+            &[(
+                "",
+                &[
+                    "View.Combined.R",
+                    "View.Combined.G",
+                    "View.Combined.B",
+                    "View.Normal.X",
+                    "View.Normal.Y",
+                    "View.Normal.Z",
+                    "Crypto00.R",
+                    "Crypto00.G",
+                    "Crypto00.B",
+                ],
+            )],
+            &["View.Combined.R", "View.Combined.G", "View.Combined.B"],
+            true,
+        ),
+        (&[("left", &["R", "G", "B"]), ("right", &["Y"])], &["R", "G", "B", "Y"], false),
+        (&[("beauty", &["R", "G", "B"]), ("normals", &["r", "g", "b"])], &["R", "G", "B"], true),
+        (
+            &[("", &["V.DiffCol.R", "V.DiffCol.G", "V.DiffCol.B"])],
+            &["V.DiffCol.R", "V.DiffCol.G", "V.DiffCol.B"],
+            false,
+        ),
+    ];
+    for (number, (parts, filtered, says)) in cases.into_iter().enumerate() {
+        let input = folder.path(&format!("{number}.exr"));
+        write_parts(&input, parts);
+        let options = arguments(input.clone(), target.clone());
+        let gpu = open_device(None).unwrap();
+        let mut filters = Filters::new(&gpu, &options).unwrap();
+        filters.file(&input, &target).unwrap();
+        assert_eq!(filters.notes.len(), usize::from(says), "{parts:?}: {:?}", filters.notes);
+        let [before, after] = [&input, &target].map(|path| read_all_flat_layers_from_file(path).unwrap());
+        assert_eq!(before.layer_data.len(), after.layer_data.len());
+        for (a, b) in before.layer_data.iter().zip(&after.layer_data) {
+            assert_eq!(a.attributes, b.attributes);
+            for (a, b) in a.channel_data.list.iter().zip(&b.channel_data.list) {
+                let name = a.name.to_string();
+                assert_eq!(name, b.name.to_string());
+                let is_kept = a.sample_data == b.sample_data;
+                assert_eq!(is_kept, !filtered.contains(&name.as_str()), "{parts:?}: {name}");
+            }
+        }
+    }
+    let input = folder.path("data.exr");
+    write_parts(&input, &[("", &["N.x", "N.y", "N.z"])]);
+    let failure = run(&arguments(input, target)).unwrap_err();
+    assert!(failure.exit_code() == 2 && failure.to_string().contains("a layer of colours"), "{failure}");
+}
+
+#[test]
+fn headers_of_an_exr_are_not_believed() {
+    let folder = Folder::new();
+    let input = folder.path("in.exr");
+    write_parts(&input, &[("", &["R", "G", "B"])]);
+    let limited = |limits| load_stored_exr(&input, &limits).map(drop).map_err(|e| e.to_string());
+    assert_eq!(limited(Limits::default()), Ok(()));
+    let small = Limits { pixels: 500, ..Limits::default() };
+    assert!(limited(small).unwrap_err().contains("the limit on pixels"));
+    let narrow = Limits { side: 30, ..Limits::default() };
+    assert!(limited(narrow).unwrap_err().contains("the limit on sides"));
+    let poor = Limits { bytes: 10_000, ..Limits::default() };
+    assert!(limited(poor).unwrap_err().contains("the limit on memory"));
+    // Each part fits, all do not.
+    let colors: &[&str] = &["R", "G", "B"];
+    write_parts(&input, &["a", "b", "c", "d", "e"].map(|name| (name, colors)));
+    let few = Limits { bytes: 25_000, ..Limits::default() };
+    assert!(limited(few).unwrap_err().contains("in all"));
+}
+
+#[test]
+fn pictures_stand_upright_and_floats_are_refused() {
+    if !has_gpu() {
+        return;
+    }
+    let folder = Folder::new();
+    // 3 x 2 texels in a PNG whose Exif says: turn by 90 degrees (6).
+    let input = folder.path("turned.png");
+    RgbImage::from_fn(3, 2, |x, y| Rgb([20 * x as u8, 20 * y as u8, 9])).save(&input).unwrap();
+    let mut png = std::fs::read(&input).unwrap();
+    let exif = b"eXIfII*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+    let crc = !exif.iter().fold(!0u32, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { c >> 1 ^ 0xedb8_8320 } else { c >> 1 })
+    });
+    let chunk = [&(exif.len() as u32 - 4).to_be_bytes()[..], exif, &crc.to_be_bytes()].concat();
+    png.splice(33..33, chunk);
+    std::fs::write(&input, png).unwrap();
+    let target = folder.path("out.png");
+    let options = arguments(input.clone(), target.clone());
+    let gpu = open_device(None).unwrap();
+    let mut filters = Filters::new(&gpu, &options).unwrap();
+    filters.file(&input, &target).unwrap();
+    assert!(filters.notes[0].to_string().contains("turned.png"), "{:?}", filters.notes);
+    let picture = image::open(&target).unwrap().to_rgb8();
+    assert_eq!((picture.width(), picture.height()), (2, 3));
+    // The top left corner of a picture turned clockwise was its bottom left one.
+    assert_eq!(picture.get_pixel(0, 0).0, [0, 20, 9]);
+    let float = folder.path("light.tif");
+    DynamicImage::from(image::Rgb32FImage::new(4, 4)).save(&float).unwrap();
+    let failure = filters.file(&float, &target).unwrap_err();
+    assert!(failure.to_string().contains("found floats"), "{failure}");
+}
+
 #[test]
 fn values_that_are_no_numbers_are_reported_or_replaced() {
     if !has_gpu() {
@@ -203,7 +336,10 @@ fn folders_of_mixed_sizes_and_bad_files() {
     let failure = run(&arguments(folder.0.path().to_owned(), target)).unwrap_err();
     let text = failure.to_string();
     assert!(text.contains("2 of 5 images failed"), "{text}");
-    assert!(text.contains("empty.png: the file is empty") && text.contains("cut.png: cannot read"), "{text}");
+    assert!(
+        text.contains("empty.png: the file is empty") && text.contains("cut.png: not a readable image"),
+        "{text}"
+    );
 }
 
 #[test]

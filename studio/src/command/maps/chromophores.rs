@@ -6,14 +6,15 @@ use clap::Args;
 use rubor_assets::convert::chromophores::{self, AlbedoEncoding, DEFAULT_GAMUT_THRESHOLD};
 use rubor_assets::convert::into_head;
 use rubor_assets::convert::skin_texels::{SkinTexels, require_layout};
-use rubor_assets::image_io::{SampleKind, load_image};
+use rubor_assets::image_io::{Purpose, SampleKind};
 use rubor_rig::map::Map;
 use rubor_rig::mask::Mask;
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
 use serde_json::{Value, json};
 
 use super::destination::{Destination, file_name};
-use super::load_mask;
+use super::{ImageArgs, load, load_mask};
+use rubor::notes::Note;
 use rubor::output;
 use rubor::{Failure, Outcome};
 
@@ -38,13 +39,15 @@ pub(crate) struct ChromophoresArgs {
     #[arg(long, default_value_t = DEFAULT_GAMUT_THRESHOLD)]
     threshold: f32,
     #[command(flatten)]
+    images: ImageArgs,
+    #[command(flatten)]
     to: Destination,
 }
 
-pub(super) fn run(a: &ChromophoresArgs) -> Outcome<Value> {
-    let receiver = a.to.head()?;
-    let image = load_image(&a.albedo)?;
-    let mut mask = load_mask(&image, a.mask.as_deref())?;
+pub(super) fn run(a: &ChromophoresArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
+    let receiver = a.to.head(notes)?;
+    let image = load(&a.albedo, &a.images.options(Purpose::Values), notes)?;
+    let mut mask = load_mask(&image, a.mask.as_deref(), notes)?;
     let encoding = if a.linear { AlbedoEncoding::Linear } else { AlbedoEncoding::Automatic };
     let albedo = chromophores::linear_albedo(&image, encoding, a.gain)?;
     if let Some(receiver) = &receiver {

@@ -6,7 +6,7 @@ use clap::Args;
 use glam::Vec3;
 use rubor_assets::convert::hemoglobin::{Calibration, read_fractions};
 use rubor_assets::convert::skin_texels::SkinTexels;
-use rubor_assets::image_io::SampleKind;
+use rubor_assets::image_io::{Purpose, SampleKind};
 use rubor_rig::head::Head;
 use rubor_rig::hemoglobin::histogram_matching::{map_difference, match_locally};
 use rubor_rig::hemoglobin::{HemoglobinError, blend, distribution, local_statistics, neutral};
@@ -14,8 +14,9 @@ use rubor_rig::map::Map;
 use rubor_rig::mask::Mask;
 use serde_json::{Value, json};
 
-use super::{UnitArg, is_exr};
+use super::{ImageArgs, UnitArg, is_exr, note_image};
 use rubor::inputs;
+use rubor::notes::Note;
 use rubor::{Failure, Outcome, output};
 
 /// Arguments of `rubor maps compare`.
@@ -45,12 +46,17 @@ pub(crate) struct CompareArgs {
     /// Picture: exact, Gaussian, difference x 8, side by side
     #[arg(short, long)]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    images: ImageArgs,
 }
 
-pub(super) fn run(a: &CompareArgs) -> Outcome<Value> {
+pub(super) fn run(a: &CompareArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
     let calibration = Calibration { unit: a.unit.into(), gain: 1.0, offset: 0.0 };
-    let base = read_fractions(&a.neutral, calibration)?;
-    let target = read_fractions(&a.target, calibration)?;
+    let options = a.images.options(Purpose::Values);
+    let base = read_fractions(&a.neutral, calibration, &options)?;
+    note_image(&a.neutral, &base.notes, notes);
+    let target = read_fractions(&a.target, calibration, &options)?;
+    note_image(&a.target, &target.notes, notes);
     let (width, height) = (base.map.width, base.map.height);
     if (width, height) != (target.map.width, target.map.height) {
         return Err(Failure::input(format!(
@@ -61,6 +67,7 @@ pub(super) fn run(a: &CompareArgs) -> Outcome<Value> {
         )));
     }
     let head = a.head.as_ref().map(|path| inputs::head(Some(path))).transpose()?;
+    notes.extend(head.iter().flat_map(|loaded| loaded.notes.iter().cloned()));
     let mut mask = base.mask.and(&target.mask);
     let regions = match &head {
         Some(loaded) => {

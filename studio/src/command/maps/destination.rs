@@ -9,6 +9,7 @@ use rubor_rig::expression::Rig;
 use rubor_rig::head::ProvenanceKind;
 
 use rubor::inputs::{self, LoadedHead};
+use rubor::notes::Note;
 use rubor::{Failure, Outcome};
 
 /// Arguments that all conversions have.
@@ -48,11 +49,11 @@ fn is_head_file(path: &Path) -> bool {
 }
 
 impl Destination {
-    /// The head that receives, or none where files are to be written.
+    /// The head that receives, or none where files are to be written; `notes` get what its reader says.
     ///
     /// # Errors
     /// A head that cannot be read; an output that does not go with it.
-    pub(crate) fn head(&self) -> Outcome<Option<LoadedHead>> {
+    pub(crate) fn head(&self, notes: &mut Vec<Note>) -> Outcome<Option<LoadedHead>> {
         let output = self.output.display();
         match &self.into {
             None if is_head_file(&self.output) => {
@@ -63,7 +64,11 @@ impl Destination {
             Some(_) if !is_head_file(&self.output) => Err(Failure::input(format!(
                 "--output {output}: with --into expected a name that ends in .glb"
             ))),
-            Some(path) => inputs::head(Some(path)).map(Some),
+            Some(path) => {
+                let loaded = inputs::head(Some(path))?;
+                notes.extend(loaded.notes.iter().cloned());
+                Ok(Some(loaded))
+            }
         }
     }
 

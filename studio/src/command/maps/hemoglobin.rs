@@ -9,15 +9,16 @@ use rubor_rig::head::{Distribution, Head};
 use rubor_rig::map::Map;
 use serde_json::{Value, json};
 
-use super::UnitArg;
 use super::destination::{Destination, file_name};
+use super::{ImageArgs, UnitArg};
+use rubor::notes::Note;
 use rubor::{Failure, Outcome};
 
 /// Arguments of `rubor maps hemoglobin`.
 #[derive(Debug, Args)]
 pub(crate) struct HemoglobinArgs {
     /// Manifest (JSON) that names all maps; the arguments that describe maps are then not needed
-    #[arg(long, conflicts_with_all = ["neutral", "target", "mask", "unit", "gain", "offset", "radius", "size"])]
+    #[arg(long, conflicts_with_all = ["neutral", "target", "mask", "unit", "gain", "offset", "radius", "size", "layer"])]
     manifest: Option<PathBuf>,
     /// Neutral hemoglobin map (PNG, TIFF or EXR) [default with --into: that of the head]
     #[arg(long, required_unless_present_any = ["manifest", "into"])]
@@ -44,13 +45,16 @@ pub(crate) struct HemoglobinArgs {
     #[arg(long, default_value_t = 256)]
     size: u32,
     #[command(flatten)]
+    images: ImageArgs,
+    #[command(flatten)]
     to: Destination,
 }
 
-pub(super) fn run(a: &HemoglobinArgs) -> Outcome<Value> {
+pub(super) fn run(a: &HemoglobinArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
     let (manifest, folder) = manifest(a)?;
-    let receiver = a.to.head()?;
+    let receiver = a.to.head(notes)?;
     let maps = hemoglobin::convert(&manifest, &folder, receiver.as_ref().map(|r| &r.head))?;
+    notes.extend(maps.notes.iter().map(|message| Note::new("", message)));
     let summary = |d: &Distribution| {
         let mean = |m: &Map| m.values.iter().sum::<f32>() / m.values.len() as f32;
         json!({ "name": d.name, "mean_scale": mean(&d.scale), "mean_bias": mean(&d.bias) })
@@ -72,15 +76,12 @@ pub(super) fn run(a: &HemoglobinArgs) -> Outcome<Value> {
         .chain(manifest.distributions.iter().map(|d| &d.file))
         .map(|f| file_name(f))
         .collect();
-    let notes = notes(&receiver.head, &maps.distributions, receiver.rig.as_ref());
+    note_lacks(&receiver.head, &maps.distributions, receiver.rig.as_ref(), notes);
     let origin = a.to.origin(format!("rubor maps hemoglobin of {}", files.join(", ")));
     let kept = into_head::put_hemoglobin(&mut receiver.head, maps, &origin)?;
     a.to.write(&receiver)?;
     report["kept_distributions"] = json!(kept);
     report["written"] = json!(a.to.output);
-    if !notes.is_empty() {
-        report["notes"] = json!(notes);
-    }
     Ok(report)
 }
 
@@ -94,13 +95,14 @@ fn manifest(a: &HemoglobinArgs) -> Outcome<(HemoglobinManifest, PathBuf)> {
         let (name, file) = t
             .split_once('=')
             .ok_or_else(|| Failure::input(format!("--target {t}: expected NAME=FILE such as joy=joy.exr")))?;
-        Ok(HemoglobinSource { name: name.into(), file: file.into(), calibration: None })
+        Ok(HemoglobinSource { name: name.into(), file: file.into(), calibration: None, layer: None })
     };
     let manifest = HemoglobinManifest {
         neutral: a.neutral.clone(),
         distributions: a.target.iter().map(source).collect::<Outcome<_>>()?,
         mask: a.mask.clone(),
         calibration: Calibration { unit: a.unit.into(), gain: a.gain, offset: a.offset },
+        layer: a.images.layer.clone(),
         radius_px: a.radius,
         size: a.size,
     };
@@ -108,13 +110,16 @@ fn manifest(a: &HemoglobinArgs) -> Outcome<(HemoglobinManifest, PathBuf)> {
 }
 
 /// What the new maps lack to show.
-fn notes(head: &Head, new: &[Distribution], rig: Option<&rubor_rig::expression::Rig>) -> Vec<String> {
-    let mut notes = Vec::new();
+fn note_lacks(
+    head: &Head,
+    new: &[Distribution],
+    rig: Option<&rubor_rig::expression::Rig>,
+    notes: &mut Vec<Note>,
+) {
     if head.maps.melanin.is_none() {
-        notes.push(
-            "the head has no melanin map, so its blood does not show: `rubor maps chromophores` makes one"
-                .into(),
-        );
+        let lack =
+            "the head has no melanin map, so its blood does not show: `rubor maps chromophores` makes one";
+        notes.push(Note::new("", lack));
     }
     if let Some(rig) = rig {
         let used = |name: &str| {
@@ -122,8 +127,7 @@ fn notes(head: &Head, new: &[Distribution], rig: Option<&rubor_rig::expression::
             expressions.chain(rig.states.values().map(|s| &s.hemoglobin)).any(|h| h.contains_key(name))
         };
         for d in new.iter().filter(|d| !used(&d.name)) {
-            notes.push(format!("no expression or state of the head's rig uses {:?}", d.name));
+            notes.push(Note::new("", format!("no expression or state of the head's rig uses {:?}", d.name)));
         }
     }
-    notes
 }

@@ -3,13 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use rubor_assets::files::plain_names;
 use rubor_assets::image_io::SampleKind;
 use rubor_renderer::footprint::{self, Footprint};
 use rubor_rig::head::{Head, SkinMaps};
 use rubor_rig::map::Map;
 use serde_json::{Value, json};
 
+use super::transfer::note_renamed;
 use rubor::Outcome;
+use rubor::notes::Note;
 use rubor::{inputs, output};
 
 /// Arguments of `rubor maps list`.
@@ -29,8 +32,8 @@ pub(crate) struct ExtractArgs {
     output: PathBuf,
 }
 
-/// Every map with the name of its file.
-fn named(maps: &SkinMaps) -> Vec<(String, &Map)> {
+/// Every map with its name; distributions and zones are called as told.
+fn named<'a>(maps: &'a SkinMaps, distributions: &[String], zones: &[String]) -> Vec<(String, &'a Map)> {
     let single = [
         ("melanin", &maps.melanin),
         ("hemoglobin", &maps.hemoglobin),
@@ -42,12 +45,12 @@ fn named(maps: &SkinMaps) -> Vec<(String, &Map)> {
     ];
     let mut all: Vec<(String, &Map)> =
         single.into_iter().filter_map(|(name, map)| Some((name.to_owned(), map.as_ref()?))).collect();
-    for d in &maps.distributions {
-        all.push((format!("{}_scale", d.name), &d.scale));
-        all.push((format!("{}_bias", d.name), &d.bias));
+    for (d, name) in maps.distributions.iter().zip(distributions) {
+        all.push((format!("{name}_scale"), &d.scale));
+        all.push((format!("{name}_bias"), &d.bias));
     }
     all.extend(maps.wrinkle_slopes.iter().enumerate().map(|(i, m)| (format!("wrinkles_{i}"), m)));
-    all.extend(maps.zones.iter().map(|z| (format!("zone_{}", z.name), &z.mask)));
+    all.extend(maps.zones.iter().zip(zones).map(|(z, name)| (format!("zone_{name}"), &z.mask)));
     all
 }
 
@@ -62,8 +65,10 @@ fn provenance_key(name: &str) -> &str {
     }
 }
 
-pub(super) fn run(a: &ListArgs) -> Outcome<Value> {
-    let head = inputs::head(a.head.as_deref())?.head;
+pub(super) fn run(a: &ListArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
+    let loaded = inputs::head(a.head.as_deref())?;
+    notes.extend(loaded.notes);
+    let head = loaded.head;
     let row = |(name, map): (String, &Map)| {
         let low = map.values.iter().copied().fold(f32::INFINITY, f32::min);
         let high = map.values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -78,7 +83,9 @@ pub(super) fn run(a: &ListArgs) -> Outcome<Value> {
             "origin": origin.map(|p| p.kind),
         })
     };
-    let maps: Vec<Value> = named(&head.maps).into_iter().map(row).collect();
+    let distributions: Vec<String> = head.maps.distributions.iter().map(|d| d.name.clone()).collect();
+    let zones: Vec<String> = head.maps.zones.iter().map(|z| z.name.clone()).collect();
+    let maps: Vec<Value> = named(&head.maps, &distributions, &zones).into_iter().map(row).collect();
     Ok(json!({ "maps": maps, "on_the_graphics_card": on_card(&head) }))
 }
 
@@ -97,12 +104,26 @@ pub(crate) fn on_card(head: &Head) -> Vec<Value> {
     footprint::of_maps(&head.maps).into_iter().map(row).collect()
 }
 
-pub(super) fn extract(a: &ExtractArgs) -> Outcome<Value> {
-    let head = inputs::head(a.head.as_deref())?.head;
+pub(super) fn extract(a: &ExtractArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
+    let loaded = inputs::head(a.head.as_deref())?;
+    notes.extend(loaded.notes);
+    let head = loaded.head;
     output::folder(&a.output)?;
+    let distributions = plain_names(head.maps.distributions.iter().map(|d| d.name.as_str()));
+    let zones = plain_names(head.maps.zones.iter().map(|z| z.name.as_str()));
+    for (d, name) in head.maps.distributions.iter().zip(&distributions) {
+        note_renamed("distribution", &d.name, name, notes);
+    }
+    for (z, name) in head.maps.zones.iter().zip(&zones) {
+        note_renamed("zone", &z.name, name, notes);
+    }
+    let maps = named(&head.maps, &distributions, &zones);
+    // A distribution "zone_a" and a zone "a_scale" would share a file.
+    let files = plain_names(maps.iter().map(|m| m.0.as_str()));
     let mut written = Vec::new();
-    for (name, map) in named(&head.maps) {
-        let file = a.output.join(format!("{}.exr", name.replace(['/', '\\'], "_")));
+    for ((name, map), stem) in maps.iter().zip(files) {
+        note_renamed("map", name, &stem, notes);
+        let file = a.output.join(format!("{stem}.exr"));
         output::save_map(&file, map, SampleKind::F32)?;
         written.push(file);
     }

@@ -10,12 +10,14 @@ use std::path::Path;
 
 use clap::{Args, Subcommand, ValueEnum};
 use rubor_assets::convert::hemoglobin::HemoglobinUnit;
-use rubor_assets::image_io::{LoadedImage, SampleKind, load_image};
+use rubor_assets::image_io::{LoadedImage, Purpose, ReadOptions, SampleKind, load_image_with};
 use rubor_rig::map::Map;
-use rubor_rig::mask::Mask;
+use rubor_rig::mask::{Mask, fill_unmapped};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
 use serde_json::{Value, json};
 
+use super::console;
+use rubor::notes::{Note, summed};
 use rubor::{Outcome, output};
 
 mod chromophores;
@@ -85,6 +87,21 @@ impl From<UnitArg> for HemoglobinUnit {
     }
 }
 
+/// How images are read.
+#[derive(Debug, Args)]
+pub(crate) struct ImageArgs {
+    /// Layer of the EXR images by its name, or by the last word of it [default: the unnamed one, or one whose name fits]
+    #[arg(long, value_name = "NAME")]
+    layer: Option<String>,
+}
+
+impl ImageArgs {
+    /// Options of the readers.
+    fn options(&self, purpose: Purpose) -> ReadOptions {
+        ReadOptions { layer: self.layer.clone(), purpose, ..ReadOptions::default() }
+    }
+}
+
 /// Arguments of `rubor maps lookup`.
 #[derive(Debug, Args)]
 pub(crate) struct LookupArgs {
@@ -101,18 +118,28 @@ pub(crate) struct LookupArgs {
 /// # Errors
 /// Input that cannot be used; output that cannot be written.
 pub(crate) fn run(arguments: &MapsArgs) -> Outcome {
+    let mut notes = Vec::new();
     let report = match &arguments.command {
-        MapsCommand::Hemoglobin(a) => hemoglobin::run(a)?,
-        MapsCommand::Chromophores(a) => chromophores::run(a)?,
-        MapsCommand::Normals(a) => normals::run(a)?,
-        MapsCommand::Transfer(a) => transfer::run(a)?,
-        MapsCommand::Predict(a) => predict::run(a)?,
-        MapsCommand::Compare(a) => compare::run(a)?,
-        MapsCommand::List(a) => list::run(a)?,
-        MapsCommand::Extract(a) => list::extract(a)?,
-        MapsCommand::Lookup(a) => run_lookup(a)?,
+        MapsCommand::Hemoglobin(a) => hemoglobin::run(a, &mut notes),
+        MapsCommand::Chromophores(a) => chromophores::run(a, &mut notes),
+        MapsCommand::Normals(a) => normals::run(a, &mut notes),
+        MapsCommand::Transfer(a) => transfer::run(a, &mut notes),
+        MapsCommand::Predict(a) => predict::run(a, &mut notes),
+        MapsCommand::Compare(a) => compare::run(a, &mut notes),
+        MapsCommand::List(a) => list::run(a, &mut notes),
+        MapsCommand::Extract(a) => list::extract(a, &mut notes),
+        MapsCommand::Lookup(a) => run_lookup(a),
     };
-    if arguments.json { super::print_json(&report) } else { print_fields(&report) }
+    // Before an error: what a reader chose may explain it.
+    console::notes(&notes);
+    let mut report = report?;
+    if !arguments.json {
+        return print_fields(&report);
+    }
+    if !notes.is_empty() {
+        report["notes"] = json!(summed(&notes));
+    }
+    super::print_json(&report)
 }
 
 /// One line for each field; the entries of a list on lines of their own.
@@ -144,20 +171,35 @@ fn print_fields(report: &Value) -> Outcome {
     Ok(())
 }
 
+/// Reads an image and keeps what its reader has to say.
+fn load(file: &Path, options: &ReadOptions, notes: &mut Vec<Note>) -> Outcome<LoadedImage> {
+    let image = load_image_with(file, options)?;
+    note_image(file, &image.notes, notes);
+    Ok(image)
+}
+
+/// Remarks of a reader about its file.
+fn note_image(file: &Path, found: &[String], notes: &mut Vec<Note>) {
+    notes.extend(found.iter().map(|message| Note::new(file.display().to_string(), message)));
+}
+
 /// Skin texels of an image: its alpha, and a drawn mask of its size.
-fn load_mask(image: &LoadedImage, file: Option<&Path>) -> Outcome<Mask> {
+fn load_mask(image: &LoadedImage, file: Option<&Path>, notes: &mut Vec<Note>) -> Outcome<Mask> {
     let mask = image.mask();
     let Some(file) = file else { return Ok(mask) };
-    let drawn = load_image(file)?;
+    let drawn = load(file, &ReadOptions::default(), notes)?;
     drawn.require_size(mask.width, mask.height)?;
     Ok(mask.and(&Mask::above(&drawn.require_grey()?, 0, 0.5)))
 }
 
-/// A grey map of values, finite everywhere.
-fn load_values(file: &Path) -> Outcome<Map> {
-    let image = load_image(file)?;
-    image.require_finite(&Mask::full(image.map.width, image.map.height))?;
-    Ok(image.require_grey()?)
+/// A grey map of values, finite everywhere: texels without alpha take those around them.
+fn load_values(file: &Path, options: &ReadOptions, notes: &mut Vec<Note>) -> Outcome<Map> {
+    let image = load(file, options, notes)?;
+    let mask = image.mask();
+    image.require_finite(&mask)?;
+    let mut map = image.require_grey()?;
+    fill_unmapped(&mut map, &mask);
+    Ok(map)
 }
 
 fn is_exr(path: &Path) -> bool {

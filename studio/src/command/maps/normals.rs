@@ -5,14 +5,15 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use rubor_assets::convert::into_head;
 use rubor_assets::convert::normals::{self, GreenAxis, Slopes};
-use rubor_assets::image_io::{LoadedImage, SampleKind, load_image};
+use rubor_assets::image_io::{LoadedImage, Purpose, ReadOptions, SampleKind};
 use rubor_rig::map::Map;
-use rubor_rig::mask::{Mask, fill_unmapped};
+use rubor_rig::mask::fill_unmapped;
 use serde_json::{Value, json};
 
 use super::destination::{Destination, file_name};
-use super::is_exr;
+use super::{ImageArgs, is_exr, load, note_image};
 use rubor::inputs::LoadedHead;
+use rubor::notes::Note;
 use rubor::{Failure, Outcome, output};
 
 /// What `rubor maps normals` makes.
@@ -55,39 +56,49 @@ pub(crate) struct NormalsArgs {
     #[arg(long, value_name = "NAME=FILE", requires = "into")]
     zone: Vec<String>,
     #[command(flatten)]
+    images: ImageArgs,
+    #[command(flatten)]
     destination: Destination,
 }
 
-pub(super) fn run(a: &NormalsArgs) -> Outcome<Value> {
-    let receiver = a.destination.head()?;
+pub(super) fn run(a: &NormalsArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
+    let receiver = a.destination.head(notes)?;
     if receiver.is_some() && !matches!(a.to, NormalsTarget::Slopes | NormalsTarget::Wrinkles) {
         return Err(Failure::input("--into: a head holds slopes, expected --to slopes or wrinkles"));
     }
     let green = if a.directx { GreenAxis::DirectX } else { GreenAxis::OpenGl };
-    let input = load_finite(&a.input)?;
+    let purpose = if a.to == NormalsTarget::Normals { Purpose::Values } else { Purpose::Normals };
+    let options = a.images.options(purpose);
+    let input = load(&a.input, &options, notes)?;
     let (signed, mut report) = match a.to {
         NormalsTarget::Normals => {
-            let codes = normals::normals_from_slopes(&input.map, green)?;
+            let mask = input.mask();
+            input.require_finite(&mask)?;
+            let mut slopes = input.map;
+            fill_unmapped(&mut slopes, &mask);
+            let codes = normals::normals_from_slopes(&slopes, green)?;
             let output = &a.destination.output;
             let kind = if is_exr(output) { SampleKind::F32 } else { integer_kind(a.bits)? };
             output::save_map(output, &codes, kind)?;
             return Ok(json!({ "written": output }));
         }
         NormalsTarget::Slopes => {
-            let slopes = slopes_of(&input, green)?;
+            let slopes = slopes_of(&input, green, notes)?;
             let report = slopes_report(&slopes);
             (slopes.map, report)
         }
-        NormalsTarget::Wrinkles => wrinkles(a, &input, green)?,
+        NormalsTarget::Wrinkles => wrinkles(a, &input, &options, green, notes)?,
         NormalsTarget::Difference => {
             let Some(base) = &a.base else { return Err(Failure::input("a difference needs --base")) };
-            let (base, wrinkles) = (load_finite(base)?.require_rgb()?, input.require_rgb()?);
-            (normals::difference(&base, &wrinkles)?, json!({}))
+            let base = load(base, &options, notes)?;
+            let mut difference = normals::difference(&codes_of(&base, notes)?, &codes_of(&input, notes)?)?;
+            fill_unmapped(&mut difference, &base.mask().and(&input.mask()));
+            (difference, json!({}))
         }
     };
     let output = &a.destination.output;
     match receiver {
-        Some(receiver) => put(a, receiver, signed, &mut report)?,
+        Some(receiver) => put(a, receiver, signed, &mut report, notes)?,
         None if is_exr(output) => output::save_map(output, &signed, SampleKind::F32)?,
         None => {
             let encoded = normals::encode_signed(&signed, a.range, a.bits)?;
@@ -99,12 +110,18 @@ pub(super) fn run(a: &NormalsArgs) -> Outcome<Value> {
     Ok(report)
 }
 
-fn put(a: &NormalsArgs, mut receiver: LoadedHead, slopes: Map, report: &mut Value) -> Outcome {
+fn put(
+    a: &NormalsArgs,
+    mut receiver: LoadedHead,
+    slopes: Map,
+    report: &mut Value,
+    notes: &mut Vec<Note>,
+) -> Outcome {
     let origin = a.destination.origin(format!("rubor maps normals of {}", file_name(&a.input)));
     if a.to == NormalsTarget::Slopes {
         into_head::put_slopes(&mut receiver.head, slopes, &origin)?;
     } else {
-        let zones = a.zone.iter().map(|z| zone(z)).collect::<Outcome<Vec<_>>>()?;
+        let zones = a.zone.iter().map(|z| zone(z, notes)).collect::<Outcome<Vec<_>>>()?;
         let names: Vec<String> = zones.iter().map(|z| z.0.clone()).collect();
         into_head::put_wrinkles(&mut receiver.head, a.wrinkle_map, slopes, zones, &origin)?;
         let driven = |name: &String| {
@@ -117,19 +134,25 @@ fn put(a: &NormalsArgs, mut receiver: LoadedHead, slopes: Map, report: &mut Valu
         }
         let of_map = |index: usize| receiver.head.maps.zones.iter().any(|z| z.wrinkle_map as usize == index);
         if !of_map(a.wrinkle_map) {
-            report["notes"] = json!(["no zone shows this wrinkle map: --zone NAME=MASK adds one"]);
+            notes.push(Note::new("", "no zone shows this wrinkle map: --zone NAME=MASK adds one"));
         }
     }
     a.destination.write(&receiver)
 }
 
 /// Slopes of a normal map, less those of its base.
-fn wrinkles(a: &NormalsArgs, input: &LoadedImage, green: GreenAxis) -> Outcome<(Map, Value)> {
-    let mut slopes = slopes_of(input, green)?;
+fn wrinkles(
+    a: &NormalsArgs,
+    input: &LoadedImage,
+    options: &ReadOptions,
+    green: GreenAxis,
+    notes: &mut Vec<Note>,
+) -> Outcome<(Map, Value)> {
+    let mut slopes = slopes_of(input, green, notes)?;
     if let Some(file) = &a.base {
-        let base = load_finite(file)?;
+        let base = load(file, options, notes)?;
         base.require_size(slopes.map.width, slopes.map.height)?;
-        for (s, b) in slopes.map.values.iter_mut().zip(&slopes_of(&base, green)?.map.values) {
+        for (s, b) in slopes.map.values.iter_mut().zip(&slopes_of(&base, green, notes)?.map.values) {
             *s -= b;
         }
         slopes.largest = slopes.map.values.iter().fold(0.0, |m, v| m.max(v.abs()));
@@ -140,18 +163,18 @@ fn wrinkles(a: &NormalsArgs, input: &LoadedImage, green: GreenAxis) -> Outcome<(
     Ok((slopes.map, report))
 }
 
-/// Slopes of a normal map; texels without alpha take those around them. Two channels of floats are slopes already.
-fn slopes_of(image: &LoadedImage, green: GreenAxis) -> Outcome<Slopes> {
-    let mut slopes = if image.map.channels == 2 && image.kind == SampleKind::F32 {
-        let largest = image.map.values.iter().fold(0.0f32, |m, v| m.max(v.abs()));
-        let steep = |s: &&[f32]| s[0].abs().max(s[1].abs()) > 1.0;
-        let beyond_45_degrees = image.map.values.chunks_exact(2).filter(steep).count();
-        Slopes { map: image.map.clone(), clamped_texels: 0, beyond_45_degrees, largest }
-    } else {
-        normals::slopes_from_normals(&image.require_rgb()?, green)?
-    };
-    fill_unmapped(&mut slopes.map, &image.mask());
+/// Slopes of a normal map; what was told from its values becomes a note.
+fn slopes_of(image: &LoadedImage, green: GreenAxis, notes: &mut Vec<Note>) -> Outcome<Slopes> {
+    let (slopes, found) = normals::slopes_of(image, green)?;
+    note_image(&image.file, &found, notes);
     Ok(slopes)
+}
+
+/// Codes of a normal map; what was told from its values becomes a note.
+fn codes_of(image: &LoadedImage, notes: &mut Vec<Note>) -> Outcome<Map> {
+    let (codes, found) = normals::codes_of(image)?;
+    note_image(&image.file, &found, notes);
+    Ok(codes)
 }
 
 fn slopes_report(slopes: &Slopes) -> Value {
@@ -162,14 +185,8 @@ fn slopes_report(slopes: &Slopes) -> Value {
     })
 }
 
-fn load_finite(file: &Path) -> Outcome<LoadedImage> {
-    let image = load_image(file)?;
-    image.require_finite(&Mask::full(image.map.width, image.map.height))?;
-    Ok(image)
-}
-
 /// Name and mask of `NAME=FILE` or `NAME=FILE#channel`.
-fn zone(text: &str) -> Outcome<(String, Map)> {
+fn zone(text: &str, notes: &mut Vec<Note>) -> Outcome<(String, Map)> {
     let wrong = || Failure::input(format!("--zone {text}: expected NAME=FILE such as chin=masks.png#r"));
     let (name, file) = text.split_once('=').ok_or_else(wrong)?;
     if name.is_empty() {
@@ -182,8 +199,19 @@ fn zone(text: &str) -> Outcome<(String, Map)> {
         Some((file, "a")) => (file, Some(3)),
         _ => (file, None),
     };
-    let image = load_image(Path::new(file))?;
-    image.require_finite(&Mask::full(image.map.width, image.map.height))?;
+    let mut image = load(Path::new(file), &ReadOptions::default(), notes)?;
+    let mapped = image.mask();
+    image.require_finite(&mapped)?;
+    // What stands where alpha is 0 shows nothing.
+    for (texel, _) in image
+        .map
+        .values
+        .chunks_exact_mut(image.map.channels as usize)
+        .zip(&mapped.mapped)
+        .filter(|(_, m)| !**m)
+    {
+        texel.iter_mut().filter(|v| !v.is_finite()).for_each(|v| *v = 0.0);
+    }
     let lacks = |what: &str| Failure::input(format!("--zone {text}: the image has no {what}"));
     let mask = match channel {
         None => image.require_grey()?,

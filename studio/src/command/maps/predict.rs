@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 use super::destination::write_head;
 use super::transfer::mean_of;
 use rubor::inputs;
+use rubor::notes::Note;
 use rubor::{Failure, Outcome};
 
 /// Predicted wrinkle weights below this stay out of a rig: geometry is never quite still.
@@ -56,8 +57,9 @@ struct Expression {
     prediction: Prediction,
 }
 
-pub(super) fn run(a: &PredictArgs) -> Outcome<Value> {
+pub(super) fn run(a: &PredictArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
     let mut loaded = inputs::head(Some(&a.head))?;
+    notes.extend(loaded.notes.iter().cloned());
     let mut rig = inputs::rig(a.rig.as_deref(), loaded.rig.clone())?;
     let mut model = model(a)?;
     let mean = mean_of(&loaded.head)?;

@@ -6,13 +6,15 @@ use clap::{Args, ValueEnum};
 use rubor_assets::convert::into_head;
 use rubor_assets::convert::surface_warp::surface_warp;
 use rubor_assets::convert::transfer::{self, BiasTransfer, Correspondence, Warp};
-use rubor_assets::image_io::SampleKind;
+use rubor_assets::files::plain_names;
+use rubor_assets::image_io::{Purpose, ReadOptions, SampleKind};
 use rubor_rig::head::{Distribution, Head};
 use rubor_rig::map::Map;
 use serde_json::{Value, json};
 
 use super::destination::{Destination, file_name};
-use super::load_values;
+use super::{ImageArgs, load_values};
+use rubor::notes::Note;
 use rubor::{Failure, Outcome};
 use rubor::{inputs, output};
 
@@ -39,6 +41,8 @@ pub(crate) struct TransferArgs {
     #[arg(long, value_enum, default_value = "ratio")]
     bias: BiasArg,
     #[command(flatten)]
+    images: ImageArgs,
+    #[command(flatten)]
     to: Destination,
 }
 
@@ -60,12 +64,12 @@ struct Giver {
     head: Option<Head>,
 }
 
-pub(super) fn run(a: &TransferArgs) -> Outcome<Value> {
-    let receiver = a.to.head()?;
-    let giver = giver(a)?;
+pub(super) fn run(a: &TransferArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
+    let receiver = a.to.head(notes)?;
+    let giver = giver(a, notes)?;
     let receiver_mean = match (&receiver, &a.to_mean) {
         (Some(receiver), _) => mean_of(&receiver.head)?,
-        (None, Some(file)) => load_values(file)?,
+        (None, Some(file)) => load_values(file, &a.images.options(Purpose::Values), notes)?,
         (None, None) => return Err(Failure::input("expected --to-mean or --into")),
     };
     let head = receiver.as_ref().map(|r| &r.head);
@@ -89,9 +93,11 @@ pub(super) fn run(a: &TransferArgs) -> Outcome<Value> {
         }
         None => {
             output::folder(&a.to.output)?;
-            for d in &own {
+            let files = plain_names(own.iter().map(|d| d.name.as_str()));
+            for (d, stem) in own.iter().zip(&files) {
+                note_renamed("distribution", &d.name, stem, notes);
                 for (what, map) in [("scale", &d.scale), ("bias", &d.bias)] {
-                    let file = a.to.output.join(format!("{}_{what}.exr", d.name));
+                    let file = a.to.output.join(format!("{stem}_{what}.exr"));
                     output::save_map(&file, map, SampleKind::F32)?;
                 }
             }
@@ -101,11 +107,21 @@ pub(super) fn run(a: &TransferArgs) -> Outcome<Value> {
     Ok(report)
 }
 
-fn giver(a: &TransferArgs) -> Outcome<Giver> {
+/// Says where a file got another name than what it holds.
+pub(super) fn note_renamed(what: &str, name: &str, file: &str, notes: &mut Vec<Note>) {
+    if name != file {
+        let message = format!("{what} {name:?}: no name of a file of its own, written as {file:?}");
+        notes.push(Note::new("", message));
+    }
+}
+
+fn giver(a: &TransferArgs, notes: &mut Vec<Note>) -> Outcome<Giver> {
     let mut giver = if a.from.is_dir() {
-        from_folder(&a.from)?
+        from_folder(&a.from, notes)?
     } else {
-        let head = inputs::head(Some(&a.from))?.head;
+        let loaded = inputs::head(Some(&a.from))?;
+        notes.extend(loaded.notes);
+        let head = loaded.head;
         let distributions = head.maps.distributions.clone();
         if distributions.is_empty() {
             let found = "found a head without distributions, expected one that has some";
@@ -123,7 +139,7 @@ fn giver(a: &TransferArgs) -> Outcome<Giver> {
     Ok(giver)
 }
 
-fn from_folder(folder: &Path) -> Outcome<Giver> {
+fn from_folder(folder: &Path, notes: &mut Vec<Note>) -> Outcome<Giver> {
     let entries = std::fs::read_dir(folder)
         .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", folder.display())))?;
     let mut names: Vec<String> = entries
@@ -134,12 +150,14 @@ fn from_folder(folder: &Path) -> Outcome<Giver> {
         let found = "found no NAME_scale.exr, expected distributions";
         return Err(Failure::input(format!("{}: {found}", folder.display())));
     }
+    let options = ReadOptions::default();
+    let mean = load_values(&folder.join("neutral_mean.exr"), &options, notes)?;
     let read = |name: &String| {
-        let map = |what: &str| load_values(&folder.join(format!("{name}_{what}.exr")));
+        let mut map = |what: &str| load_values(&folder.join(format!("{name}_{what}.exr")), &options, notes);
         Ok(Distribution { name: name.clone(), scale: map("scale")?, bias: map("bias")? })
     };
     let distributions = names.iter().map(read).collect::<Outcome<_>>()?;
-    Ok(Giver { distributions, mean: load_values(&folder.join("neutral_mean.exr"))?, head: None })
+    Ok(Giver { distributions, mean, head: None })
 }
 
 /// The mean that the distributions of a head stand on, or that of its blood.
