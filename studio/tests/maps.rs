@@ -636,8 +636,11 @@ fn a_new_map_shows_in_the_picture() {
     assert_eq!(output.status.code(), Some(2));
 }
 
+/// Name of a channel and its value at column and row.
+type NamedChannel<'a> = (&'a str, &'a dyn Fn(f32, f32) -> f32);
+
 /// An EXR of one part with these channels, each with a value for column and row.
-fn exr(folder: &Folder, name: &str, side: usize, channels: &[(&str, &dyn Fn(f32, f32) -> f32)]) -> String {
+fn exr(folder: &Folder, name: &str, side: usize, channels: &[NamedChannel<'_>]) -> String {
     use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage};
     let channels = channels.iter().map(|(name, value)| {
         let samples = (0..side * side).map(|i| value((i % side) as f32, (i / side) as f32)).collect();
@@ -734,7 +737,7 @@ fn layers_of_blood_are_chosen_and_told() {
     let blood = |level: f32| move |x: f32, y: f32| level + 0.004 * (x * 0.9).sin() * (y * 0.7).cos();
     let neutral = blood(0.02);
     let joy = blood(0.03);
-    let both: [(&str, &dyn Fn(f32, f32) -> f32); 2] = [("neutral.Y", &neutral), ("joy.Y", &joy)];
+    let both: [NamedChannel<'_>; 2] = [("neutral.Y", &neutral), ("joy.Y", &joy)];
     let file = exr(&folder, "blood.exr", 32, &both);
     let manifest = format!(
         r#"{{ "neutral": {file:?}, "layer": "neutral", "radius_px": 4, "distributions": [

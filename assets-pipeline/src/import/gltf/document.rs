@@ -183,8 +183,11 @@ impl Document {
     }
 }
 
+/// JSON and binary chunk.
+type Chunks<'a> = (Cow<'a, [u8]>, Option<Vec<u8>>);
+
 /// The JSON and the binary chunk of a GLB; a file without its header is JSON alone.
-fn chunks<'a>(bytes: &'a [u8], path: &Path) -> Result<(Cow<'a, [u8]>, Option<Vec<u8>>), ImportError> {
+fn chunks<'a>(bytes: &'a [u8], path: &Path) -> Result<Chunks<'a>, ImportError> {
     if !bytes.starts_with(b"glTF") {
         return Ok((Cow::Borrowed(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)), None));
     }

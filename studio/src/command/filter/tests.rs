@@ -168,8 +168,11 @@ fn exr_keeps_other_channels_and_light_over_one() {
     assert!(before.iter().zip(&after).filter(|(a, b)| a != b).count() < 150);
 }
 
+/// Name of a part and of its channels.
+type PartNames<'a> = (&'a str, &'a [&'a str]);
+
 /// Parts with a name and channels, all of 31 x 17 texels and of this light, each channel at a scale of its own.
-fn write_parts(path: &Path, parts: &[(&str, &[&str])]) {
+fn write_parts(path: &Path, parts: &[PartNames<'_>]) {
     use exr::prelude::*;
     let light = |i: usize| if white((i % 31) as u32, (i / 31) as u32) { 4.0 } else { 0.01 };
     let layers = parts.iter().map(|(part, names)| {
@@ -193,7 +196,7 @@ fn colours_of_an_exr_are_found_by_meaning_and_data_are_kept() {
     }
     let folder = Folder::new();
     let target = folder.path("out.exr");
-    let cases: [(&[(&str, &[&str])], &[&str], bool); 5] = [
+    let cases: [(&[PartNames<'_>], &[&str], bool); 5] = [
         (&[("", &["red", "green", "blue"])], &["red", "green", "blue"], false),
         (
             &[(
