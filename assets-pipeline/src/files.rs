@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-/// Writes a file beside its place under a name that nobody can guess, then renames it; a failure leaves nothing behind
+/// Writes a file in the same folder under an unpredictable name, then renames it; a failure leaves nothing behind
 /// and an older file as it was.
 pub(crate) fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use nalgebra::{DMatrix, DVector};
 
 /// Texture radius of the limbus: that of an anatomical eye, an iris of 5.9 mm radius on a ball of 12 mm:
-/// asin(5.9 / 12) / (2 pi). Angles are stretched so that it is the same for every eye, whatever the size of its ball.
+/// asin(5.9 / 12) / (2 pi). Angles are stretched so that it is the same for eyes of every size.
 pub(crate) const LIMBUS_UV: f32 = 0.0819;
 
 /// Radius of the iris where it meets the white, metres (visible iris diameter 11.8 mm).
