@@ -1,4 +1,4 @@
-//! How far pictures are apart.
+//! Differences of pictures.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::error::{Failure, Outcome};
 pub struct Difference {
     /// Of linear light, over all pixels.
     pub relative_rmse: f64,
-    /// Mean of squared errors, each relative to the square of what is right.
+    /// Mean of squared errors, each relative to the square of the reference.
     pub rel_mse: f64,
     /// Mean of the visible difference.
     pub flip_mean: f64,
@@ -25,7 +25,7 @@ pub struct Difference {
     pub flip_99: f64,
 }
 
-/// Compares two image files; the second is right. With it a picture of the visible differences.
+/// Compares two image files; the second is the reference. Also returns a picture of the visible differences.
 ///
 /// # Errors
 /// A file that is no image; images of different sizes; values that are not finite.
@@ -89,7 +89,7 @@ pub(crate) fn pixels(image: &Image) -> Pixels {
     }
 }
 
-/// Linear pixels, and whether the file holds light (floats) and not display values.
+/// Linear pixels, and whether the file holds light (floats) instead of display values.
 fn read(path: &Path) -> Outcome<(Pixels, bool)> {
     let image = load_image(path)?;
     let is_light = image.kind == SampleKind::F32;

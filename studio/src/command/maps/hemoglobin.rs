@@ -107,7 +107,7 @@ fn manifest(a: &HemoglobinArgs) -> Outcome<(HemoglobinManifest, PathBuf)> {
     Ok((manifest, PathBuf::new()))
 }
 
-/// What the new maps lack to show.
+/// Notes on reasons why the new maps do not show.
 fn notes(head: &Head, new: &[Distribution], rig: Option<&rubor_rig::expression::Rig>) -> Vec<String> {
     let mut notes = Vec::new();
     if head.maps.melanin.is_none() {
