@@ -22,7 +22,7 @@ const SIDE: usize = 256;
 const HALF_VIEW: f32 = 0.14;
 const RAYS: u32 = 256;
 
-/// Specular occlusion of a pixel: the truth, then estimates.
+/// Specular occlusion of a pixel: the reference, then estimates.
 type Row = [f32; 1 + ESTIMATES.len()];
 const ESTIMATES: [&str; 7] = [
     "none",
@@ -34,7 +34,7 @@ const ESTIMATES: [&str; 7] = [
     "cone towards the viewer, wide lobe",
 ];
 
-/// What a pixel shows.
+/// The surface that a pixel shows.
 #[derive(Clone, Copy)]
 struct Pixel {
     place: Vec3,
@@ -247,7 +247,7 @@ fn pose(head: &Head, name: &str, weights: &[f32], specular: &mut Vec<Row>, rough
     let eye = (head.landmarks["eye-left"] + head.landmarks["eye-right"]) / 2.0;
     let target = eye + Vec3::new(0.0, -0.03, -0.05);
     let froms = [Vec3::Z, Vec3::new(0.64, 0.0, 0.77), Vec3::new(0.1, -0.6, 0.8)];
-    // Truth and estimates of each pixel.
+    // Reference and estimates of each pixel.
     let mut found: Vec<(Pixel, Vec<f32>)> = Vec::new();
     for from in froms {
         let view = View::new(head, &points, target, from);
@@ -274,7 +274,7 @@ fn pose(head: &Head, name: &str, weights: &[f32], specular: &mut Vec<Row>, rough
                     let lagarde = ((cosine + v).powf((-16.0 * m - 1.0).exp2()) - 1.0 + v).clamp(0.0, 1.0);
                     let open = (1.0 - v).sqrt().acos();
                     let reflected = 2.0 * cosine * pixel.normal - to_eye;
-                    // What sees the viewer is open towards it.
+                    // A place that the viewer sees is open towards the viewer.
                     let axis = (v * pixel.normal + (1.0 - v) * to_eye).normalize();
                     let cones = [(pixel.normal, 1.2f32), (axis, 0.83), (axis, 1.2)].map(|(axis, k)| {
                         let lobe = (2.0 * (k * m).atan()).min(FRAC_PI_2);
@@ -321,7 +321,7 @@ fn pose(head: &Head, name: &str, weights: &[f32], specular: &mut Vec<Row>, rough
     }
 }
 
-/// What each shape changes at weight 1.
+/// The change by each shape at weight 1.
 fn shapes(head: &mut Head) -> Result<(), Box<dyn std::error::Error>> {
     let names: Vec<String> = head.shapes.iter().map(|s| s.name.clone()).collect();
     let alone: Vec<_> = names.iter().map(|n| (n.as_str(), None)).collect();

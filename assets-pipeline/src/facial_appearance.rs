@@ -1,6 +1,6 @@
-//! The vendor extension `RUBOR_facial_appearance`, version 1: what a head holds beyond glTF 2.0.
+//! The vendor extension `RUBOR_facial_appearance`, version 1: the data of a head beyond glTF 2.0.
 //!
-//! It stands in the root `extensions` of the document; its JSON schema is `docs/RUBOR_facial_appearance.schema.json`.
+//! It is in the root `extensions` of the document; its JSON schema is `docs/RUBOR_facial_appearance.schema.json`.
 //! Texel to value: `value = offset + scale * texel`, texel from 0 to 1, one offset and scale a channel.
 
 use std::collections::BTreeMap;

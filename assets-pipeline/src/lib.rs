@@ -3,7 +3,7 @@
 //! ```text
 //! OBJ set ---------+                                        +--> .glb (one file, any glTF viewer opens it)
 //! glTF / GLB ------+--> import --> Head --> convert --------+--> .usda
-//! MakeHuman data --+                (occlusion, maps)       +--> check: what is wrong or has no effect
+//! MakeHuman data --+                (occlusion, maps)       +--> check: faults and entries without effect
 //! ```
 //!
 //! ```

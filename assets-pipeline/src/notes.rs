@@ -1,11 +1,11 @@
-//! What a reader left out, guessed or repaired, summed by kind: one line says it for all places.
+//! Notes on everything that a reader left out, guessed or repaired: one line per kind, for all places.
 
 use crate::check::{Finding, list};
 
 /// One kind of thing that happened, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
-    /// What happened, what was done about it.
+    /// What happened and how it was handled.
     pub message: String,
     /// Names or places; empty where the file as a whole is meant.
     pub places: Vec<String>,

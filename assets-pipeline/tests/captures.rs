@@ -1,5 +1,5 @@
-//! What recordings of other people mean. Each row of the table in `docs/captures.md` is a recording here, and the column
-//! of outcomes is what reading it gave: `RUBOR_BLESS=1` writes the table anew.
+//! Recordings as other programs write them. Each row of the table in `docs/captures.md` is a recording here, and the
+//! column of outcomes is what reading it gave: `RUBOR_BLESS=1` writes the table anew.
 
 use std::path::Path;
 use std::time::Instant;
@@ -66,7 +66,7 @@ enum Input {
 enum Expect {
     /// Rate, samples and length in seconds.
     Take(f64, usize, f64),
-    /// What the error says.
+    /// A phrase of the error.
     Refused(&'static str),
 }
 
@@ -99,7 +99,7 @@ fn js(
     Case { what, becomes, input: Input::Json(text.into_bytes()), said, expect }
 }
 
-/// Two seconds at 60 a second in a unit, from an epoch.
+/// Two seconds at 60 per second in a unit, from an epoch.
 fn plain(column: &str, per_second: f64, start: f64) -> String {
     table(column, &times(120, |i| format!("{:.0}", start + (i as f64 * per_second / 60.0).round())))
 }
@@ -171,14 +171,14 @@ fn seconds_of_times() -> Vec<Case> {
             take(),
         ),
         csv(
-            "steps of one: frame numbers, or a sample a second",
+            "steps of one: frame numbers, or a sample per second",
             "seconds",
             table("time", &times(5, |i| i.to_string())),
             &["is read as seconds; if they are frames or milliseconds, divide them"],
             Expect::Take(1.0, 5, 4.0),
         ),
         csv(
-            "short takes at 30 (25, 24, ...) frames a second",
+            "short takes at 30 (25, 24, ...) frames per second",
             "the rate at which the seconds turn over",
             table("Timecode", &times(45, |i| timecode(30, i + 1))),
             &[],
@@ -186,16 +186,16 @@ fn seconds_of_times() -> Vec<Case> {
         ),
         csv(
             "short takes in drop frame",
-            "29.97 a second",
+            "29.97 per second",
             table("Timecode", &times(45, |i| format!("00:00:{:02};{:02}", 5 + i / 30, i % 30))),
             &[],
             Expect::Take(30.0, 45, 44.0 * 1.001 / 30.0),
         ),
         csv(
             "takes within a second",
-            "60 a second, unless a timecode rate is given",
+            "60 per second, unless a timecode rate is given",
             table("Timecode", &times(20, |i| timecode(30, i))),
-            &["the timecodes are too few to show how many frames a second has: 60"],
+            &["the timecodes are too few to show the frames per second: 60"],
             Expect::Take(60.0, 20, 19.0 / 60.0),
         ),
         csv(

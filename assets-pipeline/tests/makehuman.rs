@@ -119,7 +119,8 @@ fn ambient_visibility_follows_jaw_and_lids() {
         let squares: Vec<f32> = squares.collect();
         (squares.iter().sum::<f32>() / squares.len() as f32).sqrt()
     };
-    // Weights of jaw and blinks. The same rays, so no noise: what is left are small changes and what is between weights.
+    // Weights of jaw and blinks. The same rays, so no noise: the rest comes from small changes and from weights between
+    // those traced.
     for (jaw, blink) in [(0.0, 0.0), (1.0, 0.0), (0.75, 0.0), (0.5, 1.0)] {
         let mut weights = vec![0.0; head.shapes.len()];
         weights[head.shape_index("jawOpen").unwrap()] = jaw;

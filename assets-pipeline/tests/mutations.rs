@@ -222,7 +222,7 @@ fn glb_files() {
         };
         let _ = lint(&bytes, path);
         if let Ok(imported) = from_bytes(&bytes, path) {
-            // What is read follows the rules of heads and sequences.
+            // Accepted input follows the rules of heads and sequences.
             imported.head.validate().expect("a valid head");
             if let Some(sequence) = imported.animation {
                 sequence.check().expect("a valid sequence");

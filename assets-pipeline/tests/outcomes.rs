@@ -1,4 +1,4 @@
-//! What readers do with what files hold: each row is an input made here, its result is checked, and the table of
+//! Outcomes of reading files: each row is an input made here, its result is checked, and the table of
 //! `docs/interchange.md` is compared with what came out. `RUBOR_BLESS=1` writes the table.
 
 use std::fmt::Write;
@@ -75,7 +75,7 @@ impl Gltf {
     fn bytes(&mut self, what: &str, bytes: &[u8], check: impl FnOnce(&ImportedHead)) {
         let read = from_bytes(bytes, Path::new("face.glb"));
         self.0.row(what, read.as_ref().map(|i| &i.notes[..]));
-        // What check says of a file is no panic either.
+        // Check does not panic on the file either.
         let _ = lint(bytes, Path::new("face.glb"));
         if let Ok(imported) = &read {
             check(imported);

@@ -1,4 +1,4 @@
-//! The cases of `RUBOR_SHARED/cases`: what each README calls right.
+//! The cases of `RUBOR_SHARED/cases`: checked against the expectations in each README.
 
 use std::path::{Path, PathBuf};
 

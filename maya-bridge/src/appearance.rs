@@ -1,4 +1,4 @@
-//! What a Maya scene has no place for: maps with their units, original names, landmarks, provenance.
+//! Data that a Maya scene has no place for: maps with their units, original names, landmarks, provenance.
 //!
 //! It stands as JSON in one string attribute of the head's transform, `ruborFacialAppearance`, so it survives every
 //! edit and save in Maya. Maps are 16-bit PNG files beside the scene: `value = offset + scale * texel / 65535`, two
@@ -146,7 +146,7 @@ impl Appearance {
         Ok(read)
     }
 
-    /// Reads the maps beside the scene. What cannot be read is named and left out.
+    /// Reads the maps beside the scene. Maps that cannot be read are named and left out.
     pub(crate) fn load_maps(&self, folder: &Path, notes: &mut Vec<String>) -> SkinMaps {
         let mut maps = SkinMaps { hair_color_linear: self.hair_color_linear, ..SkinMaps::default() };
         let mut scales: BTreeMap<String, Map> = BTreeMap::new();

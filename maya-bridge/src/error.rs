@@ -20,9 +20,9 @@ pub enum ReadError {
         path: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// What stands there.
+        /// The value there.
         found: String,
-        /// What should.
+        /// The values that are allowed.
         expected: String,
     },
     /// The head breaks a rule of [`rubor_rig::head::Head::validate`].
@@ -49,14 +49,14 @@ pub enum WriteError {
         /// Reason given by the encoder.
         reason: String,
     },
-    /// What was asked for does not fit the head or the format.
+    /// A request that does not fit the head or the format.
     #[error("{at}: found {found}, expected {expected}")]
     Content {
         /// Which input.
         at: String,
-        /// What it holds.
+        /// The content of the file.
         found: String,
-        /// What it should.
+        /// The content that is expected.
         expected: String,
     },
     /// The head breaks a rule of [`rubor_rig::head::Head::validate`].

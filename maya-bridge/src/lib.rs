@@ -30,7 +30,7 @@ mod notes;
 pub mod read;
 pub mod write;
 
-/// The shader of skin colour, as it stands in `osl/`.
+/// The shader of skin colour, the text of the file in `osl/`.
 pub const SKIN_OSL: &str = include_str!("../osl/rubor_skin.osl");
 
 /// A name that Maya accepts for nodes and aliases: letters, digits and `_`, not starting with a digit.

@@ -1,4 +1,5 @@
-//! What a reader left out, guessed or repaired: notes of one kind are one line with a count and the first names.
+//! Notes on everything that a reader left out, guessed or repaired: one line per kind, with a count and the first
+//! names.
 
 use std::collections::{HashMap, HashSet};
 
@@ -21,7 +22,7 @@ struct Kind {
 }
 
 impl Notes {
-    /// A note that stands for itself; the same one counts once.
+    /// A note of its own kind; equal ones count once.
     pub(crate) fn say(&mut self, text: impl Into<String>) {
         self.kind(text.into());
     }

@@ -1,4 +1,4 @@
-//! What scenes of other people mean. Each row of the table in `docs/maya.md` is a scene here, and the column of
+//! Scenes as other people author them. Each row of the table in `docs/maya.md` is a scene here, and the column of
 //! outcomes is what reading it gave: `RUBOR_BLESS=1` writes the table anew.
 
 mod plate;
@@ -67,7 +67,7 @@ fn plays(imported: &Imported, shape: &str, values: [f32; 3]) {
 
 enum Check {
     Read(fn(&Imported)),
-    /// What the error says.
+    /// A phrase of the error.
     Refused(&'static str),
 }
 

@@ -53,7 +53,7 @@ pub struct Renderer {
     images: Images,
     timer: PassTimer,
     past: Past,
-    /// The heads and the size that the history belongs to.
+    /// Sizes and antialiasing that the history belongs to.
     past_shape: Option<([u32; 2], [u32; 2], antialias::Settings)>,
     checked: Option<Settings>,
     /// Channels of the last frame.

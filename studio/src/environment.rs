@@ -1,4 +1,4 @@
-//! Surroundings by name or file.
+//! Environments by name or file.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::notes::Note;
 /// decoded or repaired.
 ///
 /// # Errors
-/// No environment and no file of that name; an image that does not hold finite radiance of 0 or more.
+/// There is no environment or file of that name; an image that does not hold finite radiance of 0 or more.
 pub fn load(name: &str) -> Outcome<(EnvironmentMap, Vec<Note>)> {
     match EnvironmentMap::named(name) {
         Some(map) => Ok((map, Vec::new())),

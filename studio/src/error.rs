@@ -1,10 +1,10 @@
-//! How work fails: one message, perhaps a hint, and whose fault it is.
+//! Errors of the studio: one message, an optional hint, and the kind of fault.
 //!
 //! One rule decides the exit code of the command: 0 done, 1 the job failed (a file that cannot be written, a lost
 //! device, a result that is not good enough), 2 the input or the arguments are wrong.
 //!
 //! The command prints the message and the hint as they are. `miette` would break long paths over lines, which then cannot
-//! be searched for, and has nothing to add: messages already name file, line, column, what was found and what was expected.
+//! be searched for, and adds nothing: messages already name file, line, column, what was found and what was expected.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -13,18 +13,18 @@ use rubor_assets::error::{ExportError, ImportError};
 use rubor_assets::image_io::ImageError;
 use rubor_renderer::RenderError;
 
-/// What went wrong.
+/// Kind of a failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// The input or the arguments are wrong.
     Input,
     /// The input is right, and the job failed.
     Job,
-    /// Whoever reads what is printed has closed the pipe: nothing is wrong, and nothing is left to do.
+    /// The reader of the output has closed the pipe. This is not an error; the command stops.
     ClosedPipe,
 }
 
-/// Why work stopped.
+/// A failure, with its message and hint.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("{message}{}", .hint.as_ref().map(|h| format!("\n  hint: {h}")).unwrap_or_default())]
 pub struct Failure {
@@ -33,7 +33,7 @@ pub struct Failure {
     hint: Option<String>,
 }
 
-/// What work returns.
+/// Result of the studio's functions.
 pub type Outcome<T = ()> = Result<T, Failure>;
 
 impl Failure {
@@ -57,24 +57,24 @@ impl Failure {
         Self::input(format!("{}: cannot be read: {reason}", path.display()))
     }
 
-    /// Nobody reads what is printed any more.
+    /// The reader of the output has closed the pipe.
     pub fn closed_pipe() -> Self {
         Self { fault: Fault::ClosedPipe, message: "the output was closed".into(), hint: None }
     }
 
-    /// Adds what to try.
+    /// Adds a hint.
     #[must_use]
     pub fn hint(mut self, hint: impl Display) -> Self {
         self.hint = Some(hint.to_string());
         self
     }
 
-    /// What went wrong.
+    /// The kind of the failure.
     pub fn fault(&self) -> Fault {
         self.fault
     }
 
-    /// Exit code of a process that stops for it.
+    /// Exit code of the process.
     pub fn exit_code(&self) -> u8 {
         match self.fault {
             Fault::ClosedPipe => 0,
@@ -128,7 +128,7 @@ impl From<rubor_assets::convert::ConvertError> for Failure {
 }
 
 impl From<ImageError> for Failure {
-    /// An image that was to be read; see [`crate::output::save_map`] for those that are written.
+    /// Errors of reading an image; see [`crate::output::save_map`] for those that are written.
     fn from(e: ImageError) -> Self {
         Self::input(with_causes(&e))
     }
@@ -150,7 +150,7 @@ impl From<RenderError> for Failure {
     }
 }
 
-/// An error and what caused it, unless the cause is already in its words.
+/// An error and what caused it, unless its message already contains the cause.
 pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

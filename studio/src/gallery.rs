@@ -1,4 +1,4 @@
-//! A page that shows what a head, the expressions, the lights and the characters look like.
+//! A page of pictures of a head, the expressions, the lights and the characters.
 //!
 //! ```text
 //! rows (head, light, sequence) --Plan--> pictures in memory --> one page
@@ -21,7 +21,7 @@ use crate::review::contact_sheet;
 use crate::studio::Studio;
 use crate::watch::Watch;
 
-/// Pictures in a row of the page.
+/// Pictures per row of the page.
 const COLUMNS: u32 = 6;
 /// Side of a picture, unless settings say otherwise.
 pub const SIDE: u32 = 320;
@@ -34,7 +34,7 @@ struct Row {
     sequence: String,
 }
 
-/// Three views of the whole head, a second each.
+/// Three views of the whole head, one second each.
 const VIEWS: &str = r#"{ "fps": 1, "duration": 3, "camera": { "framing": "head", "elevationDegrees": 2, "target": [0, -0.02, -0.06],
     "orbitDegrees": [{ "t": 0, "v": 0 }, { "t": 1, "v": 38 }, { "t": 2, "v": 90 }] } }"#;
 /// An eye, the mouth, an ear, the nose, the hairline, an eye from the side and the chin from near.
@@ -85,7 +85,7 @@ fn rows() -> Vec<Row> {
 /// Draws the page. With the folder of the MakeHuman data (see `rubor import makehuman`), all characters too.
 ///
 /// # Errors
-/// Data that are missing or broken; what the studio refuses.
+/// Missing or broken data; errors of the studio.
 pub fn run(
     studio: &mut Studio,
     settings: &Settings,

@@ -25,9 +25,9 @@ pub struct LoadedHead {
     pub rig: Option<Rig>,
     /// The sequence that its animation was made from.
     pub sequence: Option<Sequence>,
-    /// What its animation holds.
+    /// Contents of its animation.
     pub animation: Option<Sequence>,
-    /// Where it comes from, and what the file held.
+    /// Source file and fingerprint.
     pub source: InputFile,
     /// What the reader left out, guessed or repaired.
     pub notes: Vec<Note>,
@@ -113,7 +113,7 @@ pub fn sequence(path: Option<&Path>) -> Outcome<(Sequence, Vec<Note>)> {
 /// A light rig by its name, or the lights of a sequence file.
 ///
 /// # Errors
-/// Neither has that name.
+/// There is no light rig and no file of that name.
 pub fn lights(name: &str) -> Outcome<Lighting> {
     let path = Path::new(name);
     let from = match light_rig(name) {
@@ -133,7 +133,7 @@ pub fn lights(name: &str) -> Outcome<Lighting> {
     Ok(Lighting { name: name.to_owned(), lights: from.lights, environment: from.environment })
 }
 
-/// A MakeHuman character with synthesised skin, with smaller maps than one that is worked with.
+/// A MakeHuman character with synthesised skin, with smaller maps than an imported one.
 ///
 /// # Errors
 /// Data that are missing or broken.

@@ -23,7 +23,7 @@ use crate::inputs::{self, LoadedHead};
 use crate::output;
 use crate::review::inset;
 
-/// What to draw, and how.
+/// Contents and settings of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 #[schemars(title = "rubor job")]
@@ -34,7 +34,7 @@ pub struct Job {
     /// Version of rubor that wrote it; another version may draw other pixels.
     #[serde(default = "version")]
     pub rubor: String,
-    /// Heads that stand side by side, each with the same performance; without any, the built-in head.
+    /// Heads that stand side by side, each with the same performance; if empty, the built-in head.
     #[serde(default)]
     pub heads: Vec<InputFile>,
     /// Expressions and states.
@@ -44,13 +44,13 @@ pub struct Job {
     /// Lights and surroundings in place of those of the sequence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lights: Option<Lighting>,
-    /// The image of the environment, if it is one: what its file held.
+    /// Fingerprint of the environment's image file, if it is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub environment: Option<InputFile>,
-    /// How frames are made. What is left out has the size of the sequence, else its default.
+    /// How frames are made. A missing size is that of the sequence; other missing settings have their defaults.
     #[serde(default)]
     pub settings: Settings,
-    /// A map of the moment of the first head in a corner of each frame.
+    /// A map of the first head's current state in a corner of each frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inset: Option<inset::Map>,
     /// Only these frames; without it, all of the sequence.
@@ -65,7 +65,7 @@ pub struct InputFile {
     /// Absolute, or relative to the job file; none is the head that is built into rubor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// What it held: a job whose files have changed is refused. Left out, any content will do.
+    /// Fingerprint of its content: a job whose files have changed is refused. Without it any content is accepted.
     #[serde(default, skip_serializing_if = "Fingerprint::is_unknown")]
     pub fingerprint: Fingerprint,
 }
@@ -79,7 +79,7 @@ pub struct Fingerprint(String);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct Lighting {
-    /// Name of the light rig, or the file that it was taken from; for people only.
+    /// Name of the light rig, or the file that it was taken from; for information only.
     #[serde(default)]
     pub name: String,
     /// Lamps.
@@ -109,7 +109,7 @@ impl Fingerprint {
         self.0.is_empty()
     }
 
-    /// Whether content with another fingerprint is the same as far as is known.
+    /// Whether two fingerprints agree; an empty one agrees with all.
     fn allows(&self, found: &Self) -> bool {
         self.is_unknown() || self == found
     }
@@ -139,7 +139,7 @@ impl Job {
         Ok(job)
     }
 
-    /// Puts other lights in place of those of the sequence.
+    /// Replaces the lights of the sequence.
     ///
     /// # Errors
     /// The environment is a file that cannot be read.
@@ -158,7 +158,7 @@ impl Job {
         sequence
     }
 
-    /// Reads a job file. `preset` is the quality of what the file does not say.
+    /// Reads a job file. `preset` sets the quality settings that the file leaves out.
     ///
     /// # Errors
     /// A file that cannot be read or is no job, with its line and column.
@@ -177,7 +177,7 @@ impl Job {
     /// As [`Job::read`].
     pub fn from_json(file: &str, text: &str, folder: &Path, preset: Option<Preset>) -> Outcome<Self> {
         let (mut job, source) = json::from_str::<Self>(file, text)?;
-        // The size of the sequence and the preset lie below what the job says, so its own words are read once more.
+        // The job overrides the preset and the size of the sequence, so its own settings are applied once more.
         let (written, _) = json::from_str::<Value>(file, text)?;
         job.settings = Settings::default();
         if let Some(preset) = preset {
@@ -213,7 +213,7 @@ impl Job {
     /// Its text, as [`Job::from_json`] reads it.
     ///
     /// # Errors
-    /// A number that JSON does not have.
+    /// A number that JSON cannot represent.
     pub fn to_json(&self) -> Outcome<String> {
         let text = serde_json::to_string_pretty(self).map_err(Failure::input)?;
         Ok(text + "\n")
@@ -247,10 +247,10 @@ impl Job {
         Ok(heads)
     }
 
-    /// Whether another job draws the same pixels, as far as both draw the same frames.
+    /// Whether another job draws the same pixels, in the frames that both draw.
     ///
     /// # Errors
-    /// A number that JSON does not have.
+    /// A number that JSON cannot represent.
     pub fn draws_like(&self, other: &Self) -> Outcome<bool> {
         let text = |job: &Self| Self { frames: None, schema: None, ..job.clone() }.to_json();
         Ok(text(self)? == text(other)?)
@@ -261,7 +261,7 @@ impl Job {
         schemars::schema_for!(Self).to_value()
     }
 
-    /// Takes down what the image of the environment holds.
+    /// Stores the fingerprint of the environment's image.
     fn note_environment(&mut self) -> Outcome {
         self.environment = None;
         let sequence = self.lit_sequence();
@@ -269,7 +269,7 @@ impl Job {
             return Ok(());
         };
         let path = inputs::absolute(Path::new(&name))?;
-        // A file that is not there is refused where it is loaded, with the names of those built in.
+        // A missing file is refused when it is loaded, with the names of those built in.
         if path.is_file() {
             let bytes = std::fs::read(&path).map_err(|e| Failure::read(&path, e))?;
             self.environment = Some(InputFile { file: Some(path), fingerprint: Fingerprint::of(&bytes) });

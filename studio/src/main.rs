@@ -1,4 +1,4 @@
-//! The `rubor` command: see the `rubor` library for what does the work.
+//! The `rubor` command: the work is in the `rubor` library.
 
 use std::process::ExitCode;
 

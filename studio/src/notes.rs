@@ -1,4 +1,4 @@
-//! What work wants said although it goes on: what has no effect, was guessed or repaired.
+//! Notes: warnings about entries without effect, guesses and repairs.
 //!
 //! ```
 //! use rubor::notes::{Note, summed};
@@ -9,18 +9,18 @@
 
 use std::fmt;
 
-/// One remark.
+/// One note.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     /// The file or head that it is about; may be empty.
     pub about: String,
     /// Place in the file, ready to stand before the message; may be empty.
     pub place: String,
-    /// What was found and what comes of it.
+    /// The finding and its consequence.
     pub message: String,
 }
 
-/// Names that a summed note shows.
+/// Number of names that a summed note shows.
 const SHOWN_NAMES: usize = 3;
 
 impl Note {
@@ -49,7 +49,7 @@ impl fmt::Display for Note {
     }
 }
 
-/// One line for all remarks of a kind: those about one thing whose messages differ in the first quoted name only.
+/// One line per kind: notes on the same file or head whose messages differ only in the first quoted name.
 pub fn summed(notes: &[Note]) -> Vec<String> {
     let parts: Vec<(&str, &str, &str)> = notes.iter().map(|n| split_name(&n.message)).collect();
     let is_like = |a: usize, b: usize| {
@@ -92,7 +92,7 @@ fn listed(names: &[&str]) -> String {
     }
 }
 
-/// What stands before the first quoted name, the name with its quotes, and what stands behind it.
+/// The text before the first quoted name, the name with its quotes, and the text after it.
 fn split_name(message: &str) -> (&str, &str, &str) {
     let Some(start) = message.find('"') else { return (message, "", "") };
     let mut is_escaped = false;

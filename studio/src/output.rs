@@ -12,7 +12,7 @@ use crate::error::{Failure, Outcome, with_causes};
 /// Creates a folder and its parents.
 ///
 /// # Errors
-/// The system refuses.
+/// The system reports an error.
 pub fn folder(path: &Path) -> Outcome {
     std::fs::create_dir_all(path).map_err(|e| Failure::write(path, e))
 }
@@ -20,7 +20,7 @@ pub fn folder(path: &Path) -> Outcome {
 /// Writes a file: all of it, or nothing.
 ///
 /// # Errors
-/// The system refuses.
+/// The system reports an error.
 pub fn write(path: &Path, bytes: &[u8]) -> Outcome {
     commit(path, |partial| std::fs::write(partial, bytes))
 }
@@ -28,18 +28,18 @@ pub fn write(path: &Path, bytes: &[u8]) -> Outcome {
 /// Writes a value as JSON that people can read.
 ///
 /// # Errors
-/// The system refuses.
+/// The system reports an error.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Outcome {
     let mut text = serde_json::to_vec_pretty(value).map_err(Failure::job)?;
     text.push(b'\n');
     write(path, &text)
 }
 
-/// Lets `make` fill a file of a temporary name in the same folder and then gives it its own. The temporary name has the
+/// Lets `make` fill a file of a temporary name in the same folder and then renames it. The temporary name has the
 /// same extension, for programs that choose a format by it.
 ///
 /// # Errors
-/// The system refuses, or `make` fails; then nothing is left.
+/// The system reports an error, or `make` fails; no file remains.
 pub fn commit(path: &Path, make: impl FnOnce(&Path) -> std::io::Result<()>) -> Outcome {
     let failed = |e: std::io::Error| Failure::write(path, e);
     let folder = match path.parent() {
@@ -49,7 +49,7 @@ pub fn commit(path: &Path, make: impl FnOnce(&Path) -> std::io::Result<()>) -> O
     let suffix = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
     let mut builder = tempfile::Builder::new();
     builder.prefix(".partial-").suffix(&suffix);
-    // Temporary files are for their owner only; a result is as any other file.
+    // Temporary files are readable by their owner only; a result gets the permissions of any other file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let partial = builder.tempfile_in(folder).map_err(failed)?.into_temp_path();
@@ -60,7 +60,7 @@ pub fn commit(path: &Path, make: impl FnOnce(&Path) -> std::io::Result<()>) -> O
 /// Writes a picture; its name decides the format.
 ///
 /// # Errors
-/// The system refuses, or no picture has such a name.
+/// The system reports an error, or the extension is not a picture format.
 pub fn save_picture(path: &Path, picture: &image::RgbImage) -> Outcome {
     commit(path, |partial| picture.save(partial).map_err(std::io::Error::other))
 }
@@ -68,7 +68,7 @@ pub fn save_picture(path: &Path, picture: &image::RgbImage) -> Outcome {
 /// Writes a map; its name decides the format.
 ///
 /// # Errors
-/// The system refuses; a map or a kind of samples that the format does not have.
+/// The system reports an error; a map or a kind of samples that the format does not have.
 pub fn save_map(path: &Path, map: &Map, kind: SampleKind) -> Outcome {
     rubor_assets::image_io::save_image(path, map, kind).map_err(|e| match e {
         ImageError::Io { source, .. } => Failure::write(path, source),
@@ -80,7 +80,7 @@ pub fn save_map(path: &Path, map: &Map, kind: SampleKind) -> Outcome {
 /// Writes a channel as OpenEXR under the names of its components; ids are whole numbers, all else are floats.
 ///
 /// # Errors
-/// The system refuses.
+/// The system reports an error.
 pub fn save_channel(path: &Path, data: &ChannelData) -> Outcome {
     use exr::prelude::{
         AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,

@@ -1,13 +1,13 @@
-//! A job that was checked against its heads: which frames there are, and drawing them in any order.
+//! A job that was checked against its heads: its frames, which can be drawn in any order.
 //!
 //! ```text
 //! Job + heads --new--> Plan --shots--> shots of a frame
 //! frames to draw --draw--> device: n+1 | finish: n --> taker
 //! ```
 //!
-//! Frames do not depend on which others are drawn. Antialiasing over time mixes the light of the frame before into a
-//! frame, by the speeds of both, and the speed of the frame before comes from positions of the one before that. So where
-//! a frame does not follow the last one drawn, the two before it are drawn first, after a cut.
+//! Frames do not depend on which others are drawn. Antialiasing over time mixes the light of the previous frame into a
+//! frame, depending on the speeds of both, and the speed of the previous frame comes from positions one frame earlier.
+//! So where a frame does not follow the last one drawn, the two before it are drawn first, after a cut.
 
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::head::Head;
@@ -18,7 +18,7 @@ use crate::job::Job;
 use crate::notes::Note;
 use crate::studio::{Frame, Studio};
 
-/// Share of the width of a head that is left free between two of them.
+/// Share of the width of a head that is left free between two heads.
 const SPACING: f32 = 1.05;
 /// Frames before a frame that its pixels depend on, with antialiasing over time.
 const REMEMBERED_FRAMES: u32 = 2;
@@ -81,7 +81,7 @@ impl<'a> Plan<'a> {
         &self.frames
     }
 
-    /// What has no effect.
+    /// Notes on entries without effect.
     pub fn notes(&self) -> &[Note] {
         &self.notes
     }
@@ -113,7 +113,7 @@ impl<'a> Plan<'a> {
     /// while the device works on the next. The heads have to be in the studio: see [`Plan::enter`].
     ///
     /// # Errors
-    /// What the studio refuses; what `take` returns.
+    /// Errors of the studio and of `take`.
     pub fn draw(
         &self,
         studio: &mut Studio,
@@ -150,7 +150,7 @@ impl<'a> Plan<'a> {
 pub struct Shown {
     /// Index from 0.
     pub frame: u32,
-    /// What it shows.
+    /// Shots of the heads.
     pub shots: Vec<Shot>,
     /// The finished frame.
     pub drawn: Frame,

@@ -1,4 +1,4 @@
-//! What work measured: of a job (`stats.json`), a benchmark, a chart, a gallery.
+//! Reports: the measurements of a job (`stats.json`), a benchmark, a chart, a gallery.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// What work measured. In JSON, `of` says of what.
+/// A report. In JSON, `of` names the kind of work.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "of", rename_all = "kebab-case")]
 #[schemars(title = "rubor report")]
@@ -32,7 +32,7 @@ impl Report {
     }
 }
 
-/// The device that did it.
+/// The device that was used.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct Adapter {
@@ -54,7 +54,7 @@ pub struct JobReport {
     pub settings: Settings,
     /// Frames of the job.
     pub frames: usize,
-    /// Those that this run drew; the others were there already.
+    /// Those that this run drew; the others existed already.
     pub frames_drawn: usize,
     /// From the start of the run to the first frame that was written.
     pub seconds_to_first_frame: Option<f64>,
@@ -68,9 +68,9 @@ pub struct JobReport {
     pub device_memory_bytes: u64,
     /// Textures of the maps of the first head.
     pub map_textures: Vec<MapTexture>,
-    /// What else is in the folder.
+    /// Other files in the folder.
     pub files: Vec<PathBuf>,
-    /// What was said on the way, notes of one kind in one line.
+    /// Notes, one line per kind.
     pub notes: Vec<String>,
 }
 
@@ -78,7 +78,7 @@ pub struct JobReport {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct MapTexture {
-    /// What it holds.
+    /// Its contents.
     pub texture: String,
     /// Texels of the largest level.
     pub size: [u32; 2],
@@ -88,7 +88,7 @@ pub struct MapTexture {
     pub format: String,
     /// Bytes as it is stored, all levels and layers.
     pub bytes: u64,
-    /// Block format that would do.
+    /// Suitable block format.
     pub block_format: String,
     /// Bytes in that format.
     pub block_bytes: u64,
@@ -116,9 +116,9 @@ pub struct BenchReport {
     pub adapter: Adapter,
     /// Frames that were timed for each.
     pub frames: u32,
-    /// Frames before them that were not.
+    /// Warm-up frames before them, not timed.
     pub warm_up: u32,
-    /// One for each settings.
+    /// One row for each settings.
     pub rows: Vec<BenchRow>,
 }
 
@@ -126,7 +126,7 @@ pub struct BenchReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct BenchRow {
-    /// Its methods, and what else differs between rows.
+    /// Its methods, and the other settings that differ between rows.
     pub name: String,
     /// How frames were made.
     pub settings: Settings,
@@ -168,7 +168,7 @@ pub struct ChartReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct ChartRow {
-    /// Its scattering method, and what else differs between rows.
+    /// Its scattering method, and the other settings that differ between rows.
     pub name: String,
     /// How the frame was made.
     pub settings: Settings,
@@ -203,7 +203,7 @@ pub struct GalleryReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct GalleryPicture {
-    /// What it shows.
+    /// Its subject.
     pub name: String,
     /// Frame of its sequence, from 1.
     pub frame: u32,
@@ -240,7 +240,7 @@ impl PassTimes {
     }
 }
 
-/// The middle of values, which are sorted for it.
+/// The median of values, which are sorted for it.
 pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()

@@ -37,7 +37,7 @@ pub const VIDEO_FILE: &str = "video.mp4";
 /// Name of the animated head.
 pub const HEAD_FILE: &str = "animated_head.glb";
 
-/// Where results go, and which.
+/// Destination and choice of the results.
 #[derive(Clone, Debug)]
 pub struct Destination {
     /// The folder; made if missing.
@@ -57,13 +57,13 @@ impl Destination {
     }
 }
 
-/// A frame as the writers see it.
+/// A frame for the writers.
 struct Page {
     place: usize,
     shown: Shown,
 }
 
-/// What the writers made of it.
+/// Results of the writers for a frame.
 struct Written {
     place: usize,
     small: Option<RgbImage>,
@@ -72,7 +72,7 @@ struct Written {
 /// Draws a plan into a folder.
 ///
 /// # Errors
-/// The folder holds the frames of another job; what the studio refuses; files that cannot be written.
+/// The folder holds the frames of another job; errors of the studio; files that cannot be written.
 pub fn run(
     plan: &Plan<'_>,
     studio: &mut Studio,
@@ -115,7 +115,7 @@ pub fn run(
             inset.draw(&shot.face, &job.settings.quality, &mut picture);
         }
         save_channels(&to.folder, frame, &drawn)?;
-        // Last: a frame whose picture is there is whole.
+        // Written last: if the picture of a frame exists, the frame is complete.
         output::save_picture(&frame_path(&to.folder, frame), &picture)?;
         let small = on_sheet.contains(&(place as u32)).then(|| contact_sheet::reduce(&picture));
         Ok(Written { place, small })
@@ -180,7 +180,7 @@ pub fn run(
     Ok(report)
 }
 
-/// Writes down what job the folder holds. False where a stopped run of the same job goes on: the folder then holds the
+/// Writes the job into the folder. False if a stopped run of the same job is resumed: the folder then holds the
 /// frames of both.
 fn claim_folder(job: &Job, to: &Destination) -> Outcome<bool> {
     let path = to.folder.join(JOB_FILE);
@@ -214,7 +214,7 @@ pub fn channel_path(folder: &Path, frame: u32, channel: &str) -> PathBuf {
     folder.join(format!("frame.{:04}.{channel}.exr", frame + 1))
 }
 
-/// A frame that is there with all its channels, whole and of the right size.
+/// Whether a frame exists with all its channels, complete and of the right size.
 fn read_frame(job: &Job, folder: &Path, frame: u32, size: [u32; 2]) -> Option<RgbImage> {
     let mut channels = job.settings.output.channels.iter();
     if channels.any(|c| !channel_path(folder, frame, &c.name()).is_file()) {
@@ -241,7 +241,7 @@ fn export_animated(plan: &Plan<'_>, folder: &Path) -> Outcome {
         shape_colors: true,
         ..export::gltf::Options::default()
     };
-    // What has no effect on the head was said before the first frame.
+    // Entries without effect on the head were reported before the first frame.
     export::gltf::write(&loaded.head, &options, &folder.join(HEAD_FILE))?;
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! The studio: a device, the heads that stand in front of it, and surroundings.
+//! The studio: a device, the heads that stand in front of it, and environments.
 //!
 //! ```text
 //! Head --set_heads--> device        name --environment--> device
@@ -24,7 +24,7 @@ use crate::error::{Failure, Outcome};
 use crate::notes::Note;
 use crate::report::Adapter;
 
-/// Radiance behind the heads: a grey that a face is neither lost nor dazzled before.
+/// Radiance behind the heads: a grey in front of which light and dark faces stand out.
 const BACKDROP_LINEAR: Vec3 = Vec3::new(0.016, 0.018, 0.021);
 /// Side of the skin colour table (see `rubor_rig::skin::chromophores` for its error).
 const COLOR_TABLE_SIDE: u32 = 64;
@@ -36,7 +36,7 @@ const DISTANT_LAMP_RADIUS: f32 = 0.05;
 /// Opens an adapter by its number or a part of its name, or the best one.
 ///
 /// # Errors
-/// None is there, none has that name, the driver refuses.
+/// No adapter exists, none has that name, or the driver refuses.
 pub fn open_device(wanted: Option<&str>) -> Outcome<Gpu> {
     Ok(native::open(wanted)?)
 }
@@ -55,10 +55,10 @@ pub struct Studio {
     notes: Vec<Note>,
 }
 
-/// The last environment by its name: one that turns is the same map under another angle.
+/// The last environment by its name: a rotated one is the same map at another angle.
 type Surroundings = Option<(String, Environment)>;
 
-/// A frame that the device works on.
+/// A frame in flight on the device.
 pub struct Drawn {
     frame: rubor_renderer::Drawn,
     /// Channels that the frame has to have.
@@ -70,7 +70,7 @@ pub struct Drawn {
 pub struct Frame {
     /// RGBA, sRGB transfer, opaque.
     pub image: Image,
-    /// What it cost.
+    /// Its cost.
     pub stats: FrameStats,
     /// The channels that its settings name, in that order.
     pub channels: Vec<ChannelData>,
@@ -112,7 +112,7 @@ impl Studio {
         self.renderer.gpu().has_timestamps
     }
 
-    /// Takes these heads in place of those before: the shots of a frame are of them, in this order.
+    /// Replaces the heads; a frame takes one shot per head, in this order.
     ///
     /// # Errors
     /// A head breaks its rules or does not fit the device.
@@ -125,12 +125,12 @@ impl Studio {
         Ok(())
     }
 
-    /// What loading surroundings left out, decoded or repaired since the last call.
+    /// Notes on everything that loading environments left out, decoded or repaired since the last call.
     pub fn take_notes(&mut self) -> Vec<Note> {
         std::mem::take(&mut self.notes)
     }
 
-    /// Forgets the frames before: the next frame is number `frame` and antialiasing over time mixes nothing into it.
+    /// Clears the history: the next frame is number `frame`, and temporal antialiasing mixes no previous frame into it.
     pub fn cut(&mut self, frame: u32) {
         self.renderer.cut(u64::from(frame));
     }
@@ -145,10 +145,10 @@ impl Studio {
         self.finish(drawn)
     }
 
-    /// Hands a frame to the device. The next one can be drawn before this one is finished.
+    /// Submits a frame to the device. The next one can be drawn before this one is finished.
     ///
     /// # Errors
-    /// No shot, or another number than there are heads; surroundings that do not load; what the renderer refuses.
+    /// No shot, or another number than there are heads; environments that do not load; errors of the renderer.
     pub fn draw(&mut self, shots: &[Shot], spacing_m: f32, settings: &Settings) -> Outcome<Drawn> {
         let gpu = self.renderer.gpu().clone();
         let frame = self.with_scene(shots, spacing_m, |renderer, scene| {
@@ -170,7 +170,8 @@ impl Studio {
         Ok(Frame { image, stats, channels })
     }
 
-    /// Draws a shot of one head again and again, one frame right after the other, and says what each cost; the first
+    /// Draws a shot of one head again and again, one frame right after the other, and returns the cost of each; the
+    /// first
     /// `warm_up` frames are left out.
     ///
     /// # Errors
@@ -236,7 +237,7 @@ impl Studio {
         draw(&mut self.renderer, &scene)
     }
 
-    /// Makes an environment the one on the device.
+    /// Loads an environment onto the device, unless it is there.
     fn load_environment(&mut self, name: &str) -> Outcome {
         if self.surroundings.as_ref().is_none_or(|(known, _)| known != name) {
             let (map, notes) = environment::load(name)?;

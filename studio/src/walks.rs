@@ -1,4 +1,4 @@
-//! Photon walks kept between runs, in the user's cache folder.
+//! Photon walks, stored between runs, in the user's cache folder.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -11,9 +11,9 @@ use crate::error::{Failure, Outcome};
 use crate::notes::Note;
 use crate::output;
 
-/// Walks that take less are not worth a file.
+/// Walks that take less time are not stored.
 const WORTH_KEEPING: Duration = Duration::from_secs(1);
-/// Random numbers of the walks.
+/// Seed of the walks.
 const SEED: u64 = 1;
 
 /// Media for which a table has an answer.
@@ -49,9 +49,9 @@ pub fn table(anisotropy: f64, eta: f64, photons: u64) -> Outcome<(AlbedoTable, O
         && let Some(file) = file
     {
         match keep(&file, &table) {
-            // JSON may round the last digit: every run goes on from the same numbers.
+            // JSON may round the last digit: every run continues with the numbers in the file.
             Ok(()) => return Ok((read(&file, anisotropy, eta).unwrap_or(table), None)),
-            // The result is there all the same.
+            // The result is valid all the same.
             Err(error) => {
                 let note = Note::new("", format!("the photon walk was not kept: {error}"));
                 return Ok((table, Some(note)));
@@ -61,12 +61,12 @@ pub fn table(anisotropy: f64, eta: f64, photons: u64) -> Outcome<(AlbedoTable, O
     Ok((table, None))
 }
 
-/// Everything that a walk depends on is in its file's name, and so is the version of the program that walked.
+/// Everything that a walk depends on is in its file's name, and so is the version of the program.
 fn name(anisotropy: f64, eta: f64, photons: u64) -> String {
     format!("walk-{}-g{anisotropy}-eta{eta}-{photons}-{SEED}.json", env!("CARGO_PKG_VERSION"))
 }
 
-/// A table that is whole and of the right medium; anything else is walked again.
+/// A table that is complete and of the right medium; otherwise the walk is repeated.
 fn read(file: &std::path::Path, anisotropy: f64, eta: f64) -> Option<AlbedoTable> {
     let table: AlbedoTable = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
     let walk = &table.result().walk;
@@ -80,7 +80,7 @@ fn keep(file: &std::path::Path, table: &AlbedoTable) -> Outcome {
     output::write(file, &serde_json::to_vec(table).map_err(Failure::job)?)
 }
 
-/// Where programs of this system keep what they can make again; `None` where the system does not say.
+/// Cache folder of this system; `None` if the system does not name one.
 fn cache_folder() -> Option<PathBuf> {
     directories::ProjectDirs::from("", "", "rubor").map(|dirs| dirs.cache_dir().to_owned())
 }
@@ -96,7 +96,7 @@ mod tests {
         let table = AlbedoTable::build(0.0, 1.3, 640, SEED).unwrap();
         keep(&file, &table).unwrap();
         let kept = read(&file, 0.0, 1.3).unwrap();
-        // Whoever reads it goes on from the same numbers; JSON may round the last digit of what was walked.
+        // The writer also continues with the numbers in the file, because JSON may round the last digit.
         assert_eq!(read(&file, 0.0, 1.3).as_ref(), Some(&kept));
         let pairs = kept.result().walk.albedos.iter().zip(&table.result().walk.albedos);
         assert!(pairs.clone().count() > 4 && pairs.into_iter().all(|(a, b)| (a / b - 1.0).abs() < 1e-15));

@@ -1,8 +1,8 @@
-//! How long work tells what it is doing.
+//! Progress of long work.
 
 use crate::notes::Note;
 
-/// Hears of the progress of long work, on the thread that called it. The unit type hears nothing.
+/// Receives the progress of long work, on the calling thread. The unit type ignores it.
 pub trait Watch {
     /// Work of `total` steps starts; `what` is a plural such as `frames`.
     fn begin(&mut self, what: &'static str, total: u64) {
@@ -12,10 +12,10 @@ pub trait Watch {
     /// One more step is done.
     fn step(&mut self) {}
 
-    /// The work that was begun has ended.
+    /// The work has ended.
     fn end(&mut self) {}
 
-    /// Remarks, as soon as they are known; reports hold them too.
+    /// Notes, as soon as they are known; reports contain them too.
     fn notes(&mut self, notes: &[Note]) {
         let _ = notes;
     }

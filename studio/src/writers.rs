@@ -1,21 +1,21 @@
 //! Work beside the device: threads that encode and write what was drawn, with a queue that does not grow.
 //!
-//! The threads are the run's own and not those of `rayon`: whoever feeds the queue waits when it is full, and a caller
-//! that runs within rayon's pool would wait for itself.
+//! The threads are the run's own and not those of `rayon`: the feeder waits when the queue is full, and a caller
+//! in rayon's pool would deadlock.
 
 use std::sync::mpsc::{channel, sync_channel};
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Failure, Outcome};
 
-/// Most threads: a frame is drawn in a few milliseconds at best and encoded in a hundred.
+/// Largest number of threads: a frame is drawn in a few milliseconds at best and encoded in a hundred.
 const MOST_THREADS: usize = 16;
 
-/// Runs `feed`, which pushes items, while threads do `work` on them. As many items wait as there are threads; a push
-/// into a full queue waits. `done` gets results as they come, on the thread that called.
+/// Runs `feed`, which pushes items, while threads do `work` on them. The queue holds as many items as there are
+/// threads; a push into a full queue waits. `done` gets results as they come, on the thread that called.
 ///
 /// # Errors
-/// The first failure of `feed` or of `work`; then what is queued is still done.
+/// The first failure of `feed` or of `work`; queued items are still finished.
 pub(crate) fn beside<T: Send, R: Send>(
     work: &(impl Fn(T) -> Outcome<R> + Sync),
     done: &mut impl FnMut(R),

@@ -1,4 +1,4 @@
-//! The command as a person uses it: what it makes, and what it says to wrong input.
+//! The command as a person uses it: its results, and its messages on wrong input.
 
 use std::io::Write;
 use std::path::Path;
@@ -41,7 +41,7 @@ fn text(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }
 
-/// False, loudly, where nothing can draw.
+/// False, with a loud message, if there is no adapter.
 fn can_draw() -> bool {
     let found = rubor(&["adapters"]).status.success();
     assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
@@ -245,7 +245,7 @@ fn a_head_goes_out_and_comes_back_with_its_performance() {
     json(&["export", "--head", &glb, "-o", &usd, "--json"]);
     let text = std::fs::read_to_string(&usd).expect("a layer");
     assert!(text.starts_with("#usda 1.0") && text.contains("blendShapeWeights.timeSamples"));
-    // What is written stands beside the file, nothing half written is left.
+    // Results are beside the file, and no partial file remains.
     let names = folder.names("");
     assert!(!names.iter().any(|n| n.contains("part")), "{names:?}");
 

@@ -1,4 +1,4 @@
-//! `rubor maps` as a person uses it: images of every kind into a head file, and what it says to wrong input.
+//! `rubor maps` as a person uses it: images of every kind into a head file, and its messages on wrong input.
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,4 +1,4 @@
-//! Lint: what is wrong with files, what has no effect, and why.
+//! Lint: finds faults in files and entries without effect, with the reasons.
 //!
 //! ```text
 //! glTF document --gltf----> broken or missing names, normals, weights of joints
@@ -22,7 +22,7 @@ use serde::Serialize;
 pub enum Severity {
     /// The file cannot be used as it is.
     Error,
-    /// It can, and does not do what its author most likely wants.
+    /// It can be used, but its effect is most likely not what its author wants.
     Warning,
     /// Good to know.
     Note,
@@ -36,9 +36,9 @@ pub struct Finding {
     /// Place inside the file, such as `zone "forehead"` or `line 12`; empty for the whole.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub at: String,
-    /// What is found, and why it matters.
+    /// The finding, and why it matters.
     pub message: String,
-    /// What helps.
+    /// The fix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fix: Option<String>,
 }

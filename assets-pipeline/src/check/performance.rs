@@ -78,7 +78,7 @@ pub fn check_sequence(head: &Head, rig: &Rig, sequence: &Sequence) -> (Vec<Findi
         Ok(evaluator) => evaluator,
         Err(e) => return (vec![of_error(&e)], None),
     };
-    // What the rig alone has to say was said with the rig.
+    // Findings about the rig alone were reported with the rig.
     let of_rig = BoundRig::new(head, rig).map(|(_, notes)| notes).unwrap_or_default();
     let of_sequence: Vec<Note> = notes.into_iter().filter(|n| !of_rig.contains(n)).collect();
     let mut findings: Vec<Finding> = summed(&of_sequence).iter().map(of_note).collect();

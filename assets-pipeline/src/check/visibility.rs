@@ -12,14 +12,14 @@ use rubor_rig::names::{Resolver, nearest};
 
 use super::{Finding, list};
 
-/// Slopes below this are 0.6 degrees of tilt: nobody sees them.
+/// Slopes below this are 0.6 degrees of tilt: they are invisible.
 const LEAST_SLOPE: f32 = 0.01;
 /// Weights and mask values below this show nothing in 8 bits.
 const LEAST_WEIGHT: f32 = 1.0 / 255.0;
 /// Change of the hemoglobin fraction that shifts skin by less than half a step of an 8-bit colour.
 const LEAST_BLOOD: f32 = 2e-4;
 
-/// What could show, and a performance if there is one.
+/// The maps that could show, and a performance if there is one.
 pub struct Scene<'a> {
     /// The head.
     pub head: &'a Head,

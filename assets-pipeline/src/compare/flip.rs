@@ -105,7 +105,7 @@ fn planes(pixels: &[[f64; 3]]) -> [Plane; 3] {
     std::array::from_fn(|c| pixels.iter().map(|p| p[c]).collect())
 }
 
-/// What an eye at this distance can still tell apart, as Hunt-adjusted L*a*b*.
+/// Detail that an eye at this distance can resolve, as Hunt-adjusted L*a*b*.
 fn perceived(opponent: &[[f64; 3]], width: usize, pixels_per_degree: f64) -> Vec<[f64; 3]> {
     let widest = SENSITIVITY.iter().flatten().fold(0.0f64, |m, t| m.max(t.1));
     let radius =

@@ -145,7 +145,8 @@ pub fn convert(
     summary.mean_melanin /= mapped;
     summary.mean_hemoglobin /= mapped;
     summary.mean_residual_inside /= inside;
-    // What is no skin says nothing of blood: its hemoglobin comes from the skin around, its darkness is melanin's.
+    // Texels that are not skin do not show blood: their hemoglobin comes from the skin around, their darkness counts as
+    // melanin.
     let mut skin = mask.clone();
     for (s, out) in skin.mapped.iter_mut().zip(&out_of_gamut.mapped) {
         *s &= !*out;

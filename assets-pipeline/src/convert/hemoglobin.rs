@@ -24,7 +24,7 @@ use crate::image_io::{ImageError, ReadOptions, SampleKind, load_image, load_imag
 /// Share of mapped texels outside of 0..0.32 above which a map is refused: its unit is then another one.
 const MOST_CLAMPED: f64 = 0.5;
 
-/// What the numbers of a hemoglobin map mean.
+/// Unit of the numbers of a hemoglobin map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HemoglobinUnit {
@@ -98,7 +98,7 @@ pub struct HemoglobinSource {
     pub layer: Option<String>,
 }
 
-/// What to convert: the manifest of `rubor maps hemoglobin`.
+/// The maps to convert: the manifest of `rubor maps hemoglobin`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HemoglobinManifest {
@@ -147,7 +147,7 @@ pub struct HemoglobinMaps {
     /// Maps without any contrast where they are mapped: their scale is 0, 1 or the largest, as the rules of
     /// [`rubor_rig::hemoglobin`] say.
     pub constant: Vec<String>,
-    /// What the readers of the images chose, left out or turned, with the file.
+    /// Notes on everything that the readers of the images chose, left out or rotated, with the file.
     pub notes: Vec<String>,
 }
 
@@ -199,7 +199,7 @@ pub fn read_fractions(
     for (v, mapped) in map.values.iter_mut().zip(&mask.mapped) {
         if *mapped {
             let fraction = (f64::from(*v) * calibration.gain + calibration.offset) * factor;
-            // Rounding of a code is no violation.
+            // The rounding of a code does not count as a violation.
             clamped_texels += usize::from(!(-1e-4..=MAX_HEMOGLOBIN + 1e-4).contains(&fraction));
             *v = fraction.clamp(0.0, MAX_HEMOGLOBIN) as f32;
         } else {

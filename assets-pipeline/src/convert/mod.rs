@@ -44,9 +44,9 @@ pub enum ConvertError {
     Argument {
         /// Place.
         at: String,
-        /// What stands there.
+        /// The value there.
         found: String,
-        /// What should.
+        /// The values that are allowed.
         expected: String,
     },
 }

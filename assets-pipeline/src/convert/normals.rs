@@ -42,7 +42,7 @@ pub struct Slopes {
     pub map: Map,
     /// Texels steeper than [`MAX_SLOPE`], clamped to it.
     pub clamped_texels: usize,
-    /// Texels steeper than 45 degrees in x or y: what an encoding of range 1 would lose.
+    /// Texels steeper than 45 degrees in x or y: an encoding of range 1 would lose them.
     pub beyond_45_degrees: usize,
     /// Largest absolute slope.
     pub largest: f32,
@@ -155,7 +155,7 @@ pub fn slopes_of(image: &LoadedImage, green: GreenAxis) -> Result<(Slopes, Vec<S
         (Slopes { map: image.map.clone(), clamped_texels: 0, beyond_45_degrees, largest }, Vec::new())
     } else {
         let (mut codes, notes) = codes_of(image)?;
-        // What stands beside the mapped texels is no normal: flat, so that no count of steep texels holds it.
+        // Texels outside the mask hold no normal: they become flat, so that they do not count as steep.
         let mask: Mask = image.mask();
         for (c, _) in codes.values.chunks_exact_mut(3).zip(&mask.mapped).filter(|(_, m)| !**m) {
             c.copy_from_slice(&[0.5, 0.5, 1.0]);
@@ -261,7 +261,7 @@ pub fn decode_signed(encoded: &Encoded) -> Map {
 /// Difference map (section 8.2.1): unit normals of the wrinkles minus those of the base, 3 channels, -2..2.
 ///
 /// Both are normal maps in codes 0..1. [`encode_signed`] stores it; with range 1 that is `0.5 + 0.5 (w - b)` of the
-/// thesis, but for the code of zero.
+/// thesis, except for the code of zero.
 ///
 /// # Errors
 /// Other channels, or maps of different sizes.

@@ -4,8 +4,8 @@
 //! Hammersley set turned by a hash of the point (so that neighbours do not share a pattern). Same head, same values.
 //!
 //! A shape changes it where jaw, lips and lids open or close a cavity: the difference of the whole head's visibility at
-//! weights 0.5 and 1 to that at rest, with the same rays. The renderer adds differences by weight; `docs/occlusion.md` has the error
-//! against rays in the deformed head, and that of occlusion from the screen.
+//! weights 0.5 and 1 to that at rest, with the same rays. The renderer adds differences by weight; `docs/occlusion.md`
+//! has the error against rays in the deformed head, and that of occlusion from the screen.
 
 use std::f32::consts::TAU;
 
@@ -51,7 +51,7 @@ pub const SHAPES: [(&str, Option<&str>); 21] = [
     ("browDownRight", None),
 ];
 
-/// What hides the sky from the places of a mesh.
+/// The surfaces that hide the sky from the places of a mesh.
 ///
 /// Only opaque parts: not lashes, hair, wet shells and hidden ones.
 pub struct Blockers {
@@ -93,7 +93,7 @@ impl Blockers {
     }
 }
 
-/// Fills `head.mesh.occlusion` with `rays` rays a point.
+/// Fills `head.mesh.occlusion` with `rays` rays per point.
 ///
 /// Parts that do not occlude and overlap others get values all the same. Eyes do not occlude themselves, so that the
 /// cornea's edge stays even.
@@ -103,8 +103,8 @@ pub fn bake(head: &mut Head, rays: u32) {
     head.mesh.occlusion = smooth(head, &raw);
 }
 
-/// Fills `occlusion` of the shapes `names` that the head has, with `rays` rays a point; a shape that is made for another
-/// counts on top of that. Points of eyes are left out: the renderer finds their lids in the picture.
+/// Fills `occlusion` of the shapes `names` that the head has, with `rays` rays per point; a shape that is made for
+/// another counts on top of that. Points of eyes are left out: the renderer finds their lids in the picture.
 pub fn bake_shapes(head: &mut Head, rays: u32, names: &[(&str, Option<&str>)]) {
     let is_eye = points_of_eyes(head);
     let rest = of_pose(head, &head.mesh.points, rays, &vec![true; is_eye.len()]);
@@ -148,7 +148,8 @@ fn points_of_eyes(head: &Head) -> Vec<bool> {
     is_eye
 }
 
-/// Points within reach of what a shape moves. On a grid: what lies in the cell of a moved point or beside it.
+/// Points within reach of the points that a shape moves, on a grid: those in the cell of a moved point or a
+/// neighbouring cell.
 fn near_motion(head: &Head, shape: usize) -> Vec<bool> {
     let height = head.height().max(f32::MIN_POSITIVE);
     let cell = |p: Vec3| (p / (REACH * height)).floor().as_ivec3();

@@ -17,7 +17,7 @@ use rubor_rig::strain::{StrainModel, point_strain};
 
 use super::skin_texels::SkinTexels;
 
-/// What the strain of one expression says.
+/// The prediction from the strain of one expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
     /// Scale and bias on the neutral mean that was given.
@@ -49,7 +49,7 @@ pub fn predict(head: &Head, model: &StrainModel, name: &str, deformed: &[Vec3], 
     }
 }
 
-/// A state of a head that has a distribution: what a model can be fitted to.
+/// A state of a head that has a distribution, to which a model can be fitted.
 #[derive(Clone, Debug)]
 pub struct KnownState<'a> {
     /// Deformed points of the head.

@@ -75,13 +75,13 @@ impl<'a> SkinTexels<'a> {
         Some(a * weights.x + b * weights.y + c * weights.z)
     }
 
-    /// A map of 1 channel from one value a point of the mesh; texels without skin take the skin around them.
+    /// A map of 1 channel from one value per point of the mesh; texels without skin take the skin around them.
     ///
     /// # Panics
     /// When `values` has another length than the points.
     pub fn map_of_points(&self, values: &[f32]) -> Map {
         let mesh = &self.head.mesh;
-        assert_eq!(values.len(), mesh.points.len(), "one value a point");
+        assert_eq!(values.len(), mesh.points.len(), "one value per point");
         let mut map = Map::filled(self.width, self.height, &[0.0]);
         for y in 0..self.height {
             for x in 0..self.width {

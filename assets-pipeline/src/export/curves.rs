@@ -1,4 +1,4 @@
-//! Functions of time as few keys: what formats with step, linear and cubic interpolation can hold.
+//! Functions of time as few keys, for formats with step, linear and cubic interpolation.
 //!
 //! ```text
 //! breaks (authored keys, jumps) --split--> pieces --all constant--> step
@@ -6,8 +6,8 @@
 //!                                                 --else: halve until a cubic fits, join while one fits--> cubic
 //! ```
 //!
-//! The easings of a sequence are polynomials of degree three but for one, so most curves come out as they were written:
-//! a cubic through four values of a cubic is that cubic.
+//! The easings of a sequence are polynomials of degree three except one, so most curves are exported as they were
+//! authored: a cubic through four values of a cubic is that cubic.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ use rubor_rig::timeline::{Ease, Track, TrackValue};
 const BEFORE_S: f64 = 1e-9;
 /// Pieces are not halved below this, seconds: a kink, where a weight meets its limit, would have no end.
 const SHORTEST_S: f64 = 1.0 / 4096.0;
-/// Rounding of weights in f32 is no deviation.
+/// Largest error that counts as rounding of weights in f32.
 const ROUNDING: f64 = 4e-7;
 /// Samples of a piece: its ends, its thirds, and between them.
 const SAMPLES: usize = 7;
@@ -48,7 +48,7 @@ impl Breaks {
         }
     }
 
-    /// Adds every frame: what happens between keys (a saccade takes less than one) is not overlooked.
+    /// Adds every frame, so that events between keys (a saccade is shorter) are not missed.
     pub fn add_frames(&mut self, fps: f64) {
         let mut frame = 1.0;
         while frame / fps < self.end_s {
@@ -89,9 +89,9 @@ pub struct Curve {
 pub struct CurveKey {
     /// Seconds.
     pub time_s: f32,
-    /// One a channel.
+    /// One per channel.
     pub values: Vec<f32>,
-    /// Slopes a second on the way in and out; empty unless the curve is cubic.
+    /// Slopes per second on the way in and out; empty unless the curve is cubic.
     pub slopes: [Vec<f32>; 2],
 }
 

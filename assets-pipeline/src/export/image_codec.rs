@@ -33,7 +33,7 @@ pub enum TextureFormat {
 }
 
 impl TextureFormat {
-    /// What a file name ends in.
+    /// The extension of a file name.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",

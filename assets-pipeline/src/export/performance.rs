@@ -14,7 +14,7 @@ use crate::error::ExportError;
 pub struct Performance<'a> {
     /// Expressions, states, combinations, in-betweens.
     pub rig: &'a Rig,
-    /// What happens.
+    /// The performance.
     pub sequence: &'a Sequence,
 }
 
@@ -59,7 +59,7 @@ impl PerformanceCurves {
         let with = |tracks: &[&rubor_rig::timeline::Track<f32>]| {
             let mut breaks = Breaks::new(sequence.duration);
             tracks.iter().for_each(|t| breaks.add(t));
-            // Nobody keys what the living do.
+            // Involuntary motion is not keyed.
             if sequence.life.is_some() {
                 breaks.add_frames(sequence.fps);
             }

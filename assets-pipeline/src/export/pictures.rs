@@ -23,7 +23,7 @@ pub(super) struct Picture {
     pub(super) color: ExtendedColorType,
 }
 
-/// What the parts of a head need; absent where no part does.
+/// Pictures that the parts of a head need; absent if no part needs them.
 pub(super) struct Pictures {
     /// sRGB.
     pub(super) base_color: Option<Picture>,

@@ -1,4 +1,4 @@
-//! What the channels of an EXR part mean, told by their names.
+//! Meaning of the channels of an EXR part, from their names.
 //!
 //! A name is `layer.channel` (OpenEXR, "Technical Introduction", section on channel names); programs write it in many
 //! ways: `R`, `.R`, `red`, `ViewLayer.Combined.R`, `N.x`, `diffuse_g`.
@@ -11,7 +11,7 @@ enum Meaning {
     Blue,
     Alpha,
     X,
-    /// Luminance where no x and z stand beside it.
+    /// Luminance, if there is no x and z beside it.
     Y,
     Z,
     U,

@@ -79,7 +79,7 @@ mod tests {
             assert!(message.contains(word) && message.contains("a.png"), "{message}");
         }
         assert!(limits.check("a".as_ref(), "size", (1 << 32, 1 << 32), u64::MAX).is_err());
-        // What the documentation of the defaults promises.
+        // The documentation of the defaults promises this.
         let default = Limits::default();
         assert!(default.check("a".as_ref(), "size", (16384, 16384), 6).is_ok());
         assert!(default.check("a".as_ref(), "size", (11000, 11000), 15).is_ok());

@@ -9,7 +9,7 @@
 //!
 //! Values are those of the file: integers become 0..1 by their largest code, floats stay. No transfer function is
 //! applied; what the numbers mean is the converter's business. Alpha is kept apart as coverage. What a reader chose,
-//! left out or turned stands in [`LoadedImage::notes`]. `docs/interchange.md` lists what is read, refused and repaired.
+//! left out or rotated is in [`LoadedImage::notes`]. `docs/interchange.md` lists what is read, refused and repaired.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -51,19 +51,19 @@ pub enum ImageError {
     Decode {
         /// The file.
         file: PathBuf,
-        /// What the decoder says.
+        /// The decoder's message.
         message: String,
     },
-    /// The image is readable but not what is asked for.
+    /// The image is readable but of the wrong kind.
     #[error("{}, {at}: found {found}, expected {expected}", file.display())]
     Content {
         /// The file.
         file: PathBuf,
         /// Place in it.
         at: String,
-        /// What stands there.
+        /// The value there.
         found: String,
-        /// What should.
+        /// The values that are allowed.
         expected: String,
     },
 }
@@ -90,7 +90,7 @@ pub struct LoadedImage {
     pub alpha: Option<Map>,
     /// How the file stores samples.
     pub kind: SampleKind,
-    /// What the reader chose, left out or turned, for people.
+    /// Notes on everything that the reader chose, left out or rotated.
     pub notes: Vec<String>,
 }
 
@@ -107,12 +107,12 @@ pub enum Purpose {
 /// How an image is read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// What a header may claim.
+    /// Limits on the claims of a header.
     pub limits: Limits,
     /// Part, layer or channel of an EXR by its name, or by the last word of it (`Normal` of `ViewLayer.Normal`), in
     /// any case of letters. Images of other kinds have no layers and refuse a name.
     pub layer: Option<String>,
-    /// What decides between layers without a name.
+    /// How a layer is chosen if none is named.
     pub purpose: Purpose,
 }
 
@@ -254,7 +254,7 @@ pub fn decode_image(file: &Path, bytes: &[u8], options: &ReadOptions) -> Result<
 pub struct LoadedPicture {
     /// The picture, upright.
     pub image: DynamicImage,
-    /// What the reader left out or turned, for people.
+    /// Notes on everything that the reader left out or rotated.
     pub notes: Vec<String>,
 }
 
@@ -321,7 +321,7 @@ pub(crate) fn load_environment(
 /// Runs a decoder of another crate. Those check their arithmetic late or not at all (`tiff` 0.11 multiplies tags of the
 /// file, `exr` 1.74 adds window corners), so a panic of theirs on hostile bytes becomes the error that it should be.
 fn contained<T>(file: &Path, decode: impl FnOnce() -> Result<T, ImageError>) -> Result<T, ImageError> {
-    // Nothing outlives a failed call: the closure owns its decoder and only borrows bytes.
+    // No state outlives a failed call: the closure owns its decoder and only borrows bytes.
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(decode)).unwrap_or_else(|_| {
         let message = "the decoder failed on values that no valid file has".into();
         Err(ImageError::Decode { file: file.to_owned(), message })

@@ -30,7 +30,7 @@ pub(super) fn remapped(map: &Map, width: u32, height: u32, source: impl Fn(u32, 
     Map { width, height, channels: map.channels, values }
 }
 
-/// What a note says about a picture that was turned.
+/// The note on a picture that was rotated.
 pub(super) fn note(orientation: Orientation) -> Option<String> {
     (orientation != Orientation::NoTransforms).then(|| {
         let code = orientation.to_exif();

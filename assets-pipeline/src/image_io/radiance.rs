@@ -23,9 +23,9 @@ pub(super) fn matches(bytes: &[u8]) -> bool {
     bytes.starts_with(b"#?")
 }
 
-/// What a header says.
+/// Contents of a header.
 struct Header {
-    /// What the stored values are to be divided by, channel by channel: EXPOSURE times COLORCORR.
+    /// Divisor of the stored values, per channel: EXPOSURE times COLORCORR.
     divisor: [f32; 3],
     /// Axis, direction and length of the scan lines' order, then of the pixels in a line: `-Y 32 +X 64`.
     axes: [(Axis, bool, u64); 2],

@@ -84,7 +84,7 @@ fn require_end_of_jpeg(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// Exif that stands behind the pixels, where the decoder does not look (PNG, third edition, 11.3.4.5); notes an
+/// Exif data behind the pixels, where the decoder does not look (PNG, third edition, 11.3.4.5); notes an
 /// animation.
 fn png_chunks(bytes: &[u8], notes: &mut Vec<String>) -> Option<Vec<u8>> {
     let mut rest = bytes.get(8..)?;

@@ -42,7 +42,7 @@ pub enum GroupBy {
 pub struct ObjFile {
     /// All points in the order of the file, used or not.
     pub mesh: PolyMesh,
-    /// What was left out, guessed or repaired.
+    /// Notes on everything that was left out, guessed or repaired.
     pub notes: Vec<Note>,
 }
 
@@ -76,7 +76,7 @@ pub(crate) fn read_points(path: &Path, group_by: GroupBy) -> Result<ObjFile, Imp
 /// Reads from memory; `path` is for messages. A file without faces is points alone.
 ///
 /// # Errors
-/// As [`read`], but for the file itself.
+/// As [`read`], except errors of the file itself.
 pub fn from_bytes(text: &[u8], path: &Path, group_by: GroupBy) -> Result<ObjFile, ImportError> {
     if text.starts_with(&[0xff, 0xfe]) || text.starts_with(&[0xfe, 0xff]) {
         return Err(ImportError::content(path, "byte order mark", "UTF-16", "UTF-8 or Latin-1: save it so"));

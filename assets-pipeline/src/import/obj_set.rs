@@ -37,7 +37,7 @@ const OFFSET_THRESHOLD: f32 = 3e-5;
 /// File names (lower case, without extension) that mean the neutral mesh.
 const NEUTRAL_NAMES: [&str; 6] = ["neutral", "generic_neutral_mesh", "basehead", "base_head", "base", "rest"];
 
-/// What to read.
+/// Options of reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Folder of OBJ files.
@@ -48,7 +48,7 @@ pub struct Options {
     pub units: Units,
     /// Catmull-Clark steps, 0 to 2.
     pub subdivide: u32,
-    /// Rays a point for ambient occlusion; 0 leaves it out.
+    /// Rays per point for ambient occlusion; 0 leaves it out.
     pub occlusion_rays: u32,
     /// SPDX licence expression for the provenance.
     pub licence: String,
@@ -116,7 +116,7 @@ impl std::str::FromStr for Units {
 pub struct ImportedSet {
     /// The head, validated.
     pub head: Head,
-    /// What was left out, guessed or repaired.
+    /// Notes on everything that was left out, guessed or repaired.
     pub notes: Vec<Note>,
 }
 
@@ -263,7 +263,7 @@ fn obj_files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
             folder,
             "folder",
             "no *.obj files",
-            "a neutral mesh and one a shape",
+            "a neutral mesh and one per shape",
         ));
     }
     Ok(files)
@@ -432,7 +432,7 @@ fn ibug_points(path: &Path, mesh: &PolyMesh) -> Result<Vec<Vec3>, ImportError> {
     list.iter().map(point).collect()
 }
 
-/// What can be found without an index: the top of the head, ears, cheeks, the projection of the glabella.
+/// Landmarks that can be found without an index: the top of the head, ears, cheeks, the projection of the glabella.
 fn add_estimates(mesh: &PolyMesh, landmarks: &mut BTreeMap<String, Vec3>) {
     let skin: Vec<bool> = mesh.groups.iter().map(|g| material_of(g) == Material::Skin).collect();
     let points: Vec<Vec3> = (0..mesh.face_count())

@@ -11,9 +11,9 @@ use std::collections::BTreeMap;
 pub struct UsdaError {
     /// From 1.
     pub line: usize,
-    /// What stands there.
+    /// The value there.
     pub found: String,
-    /// What should.
+    /// The values that are allowed.
     pub expected: &'static str,
 }
 
@@ -49,7 +49,7 @@ impl Value {
     }
 }
 
-/// A prim and what stands in it.
+/// A prim and its contents.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Prim {
     /// From the root, such as `/head/Face`.
@@ -78,7 +78,7 @@ impl Layer {
     }
 }
 
-/// Nested deeper than this is no head.
+/// Largest nesting depth of a head's layer.
 const MOST_LEVELS: usize = 64;
 
 /// Reads a layer.

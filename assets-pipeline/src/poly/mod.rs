@@ -1,4 +1,4 @@
-//! Polygon meshes: what an importer works on before it becomes a `Head`.
+//! Polygon meshes, which importers work on before they make a `Head`.
 //!
 //! ```text
 //! OBJ, base mesh --> PolyMesh + Shape --subdivide, clip (as stencils)--> PolyMesh + Shape --build--> Head
@@ -167,7 +167,7 @@ impl PolyMesh {
         (mesh, move_shapes(shapes, &points.stencils))
     }
 
-    /// Cuts away where `keep` is negative; `keep` has one value a point and is linear along edges.
+    /// Cuts away where `keep` is negative; `keep` has one value per point and is linear along edges.
     pub fn clip(&self, keep: &[f32], shapes: &[Shape]) -> (PolyMesh, Vec<Shape>) {
         let (mesh, stencils) = clip::clip(self, keep);
         let shapes = move_shapes(shapes, &stencils);

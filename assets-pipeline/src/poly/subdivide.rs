@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::Stencils;
 
-/// What happens along an edge that has not exactly two faces.
+/// Treatment of an edge that does not have exactly two faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Border {
     /// A uniform cubic B-spline.
@@ -15,7 +15,7 @@ pub(super) enum Border {
 
 /// Result of one step.
 pub(super) struct Subdivided {
-    /// Old points first, then one a edge, then one a face.
+    /// Old points first, then one per edge, then one per face.
     pub(super) stencils: Stencils,
     /// One quad a corner of the old faces, in their order.
     pub(super) quads: Vec<[u32; 4]>,

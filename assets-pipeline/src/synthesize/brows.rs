@@ -114,7 +114,7 @@ impl Hairs {
         let coarse = noise(squeezed(5.0), 0.9, self.seed ^ 14);
         let tufts = noise(place, 6.0, self.seed ^ 15);
         let strokes = smoothstep(-1.0, 0.9, fine + 0.5 * coarse + 0.1 * tufts + 3.4 * (density - 0.55));
-        // Skin shimmers through what is cropped, unevenly: what is seen of it varies, not what is hidden, or dense hair would
+        // Skin shows unevenly through cropped hair: the visible share varies, not the hidden one, or dense hair would
         // have pale patches. Single hairs are drawn over it.
         let there = smoothstep(0.0, 0.5, density);
         let uneven = 1.0 + there * (0.16 * noise(place, 14.0, self.seed ^ 17) + 0.12 * tufts);

@@ -60,7 +60,8 @@ impl Chromophores {
         noise(place, wavelength_mm, self.seed ^ seed)
     }
 
-    /// Melanin volume fraction of the epidermis without hair. A hollow ([`Regions::hollow`]) holds what stands for its depth.
+    /// Melanin volume fraction of the epidermis without hair. A hollow ([`Regions::hollow`]) holds melanin that
+    /// imitates its depth.
     pub(crate) fn melanin(&self, place: Vec3, r: &Regions, cavity: f32, hollow: f32) -> f32 {
         let uneven = 0.055 * self.noise(place, 28.0, 1)
             + 0.045 * self.noise(place, 9.0, 2)

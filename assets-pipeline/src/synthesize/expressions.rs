@@ -179,7 +179,7 @@ const STATES: [State; 9] = [
     },
 ];
 
-/// What one state does at a place: factors of mean and of relative spread.
+/// Effect of one state at a place: factors of mean and of relative spread.
 fn response(state: &State, index: usize, side: f32, place: Vec3, r: &Regions, seed: u32) -> (f32, f32) {
     let lateral = (place.x / 25.0).clamp(-1.0, 1.0);
     let own = noise(place, 24.0, seed ^ (0x600 + index as u32));

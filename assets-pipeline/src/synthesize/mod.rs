@@ -10,7 +10,7 @@
 //! millimetres and become slopes by differentiation along the texture frame, so relief has its true depth on any head.
 //! All of it follows from the head, the options and the seed; the number of threads has no influence.
 //!
-//! What it does not do: nothing here is measured from a person. The distributions of expressions follow the findings
+//! Limits: nothing here is measured from a person. The distributions of expressions follow the findings
 //! of papers/004 section 7.3.1, not their data.
 
 mod brows;
@@ -52,7 +52,7 @@ pub const MASK_RESOLUTION: u32 = 128;
 /// Side of the maps that [`synthesize`] accepts, texels.
 pub const RESOLUTIONS: std::ops::RangeInclusive<u32> = 256..=4096;
 
-/// Who the maps are of.
+/// The person whose maps are made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Another seed is another person with the same parameters.
@@ -75,7 +75,7 @@ pub struct Options {
     pub stubble: f32,
     /// Cropped scalp hair, 0 (bald) to 1.
     pub scalp_hair: f32,
-    /// Melanin fraction that stands for hair, up to 0.5.
+    /// Melanin fraction that represents hair, up to 0.5.
     pub hair_melanin: f32,
     /// Share of hairs without pigment, 0 to 1.
     pub grey_hair: f32,
@@ -147,7 +147,7 @@ pub enum SynthesizeError {
     /// The resolution is out of range.
     #[error("resolution: found {found}, expected {} to {} texels", RESOLUTIONS.start(), RESOLUTIONS.end())]
     Resolution {
-        /// What was asked for.
+        /// The value that was asked for.
         found: u32,
     },
     /// An option is out of range or not a number.
@@ -155,7 +155,7 @@ pub enum SynthesizeError {
     Option {
         /// Name of the field of [`Options`].
         option: &'static str,
-        /// What was asked for.
+        /// The value that was asked for.
         found: f32,
         /// Least accepted value.
         low: f32,
@@ -294,7 +294,7 @@ fn lasting_lines(age_years: f32) -> f32 {
     0.03 + 0.5 * noise::smoothstep(26.0, 85.0, age_years)
 }
 
-/// What to write into a head's provenance for maps made by [`synthesize`].
+/// Provenance of maps made by [`synthesize`].
 pub fn provenance(options: &Options) -> Vec<Provenance> {
     let source = format!(
         "rubor {} map synthesis, seed {}, {} texels, melanin {}, hemoglobin {}, age {}",

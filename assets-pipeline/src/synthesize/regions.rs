@@ -191,7 +191,7 @@ pub(crate) fn above_hairline(p: Vec2) -> f32 {
     }
 }
 
-/// How much a place (x >= 0) belongs to the ear. What the ear hides of the skull seen from the side counts too.
+/// How much a place (x >= 0) belongs to the ear. The part of the skull that the ear hides from the side counts too.
 fn ear_weight(c: Vec3) -> f32 {
     if !(60.0..110.0).contains(&c.x) || !(-42.0..4.0).contains(&c.z) || !(-58.0..6.0).contains(&c.y) {
         return 0.0;

@@ -5,8 +5,8 @@
 //!   --> tapered ribbon whose blend shapes are those of the surface under it
 //! ```
 //!
-//! A ribbon is a fraction of a pixel wide; its texture coordinate tells a renderer what it is: u = 2 id + side (id from
-//! 1, side 0 to 1 across), v from root (0) to tip (1). Cards have u within 0 to 1.
+//! A ribbon is a fraction of a pixel wide; its texture coordinate identifies it for a renderer: u = 2 id + side (id
+//! from 1, side 0 to 1 across), v from root (0) to tip (1). Cards have u within 0 to 1.
 
 use std::collections::HashMap;
 

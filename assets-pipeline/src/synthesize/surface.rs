@@ -20,7 +20,7 @@ const BAND_ROWS: usize = 32;
 /// No triangle covers the texel.
 const EMPTY: u32 = u32::MAX;
 
-/// What the fields need to know of a corner.
+/// Data of a corner that the fields need.
 #[derive(Clone, Copy)]
 struct Corner {
     uv: Vec2,
@@ -147,7 +147,7 @@ impl SkinSurface {
     }
 }
 
-/// Writes a triangle (corners in texels) into the rows of a band, where it is inside or nearer than what is there.
+/// Writes a triangle (corners in texels) into the rows of a band, where it is inside or nearer than the stored one.
 fn fill(
     index: u32,
     corners: [Vec2; 3],

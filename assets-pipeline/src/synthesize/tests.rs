@@ -414,7 +414,8 @@ fn the_ears_of_every_character_are_bald() {
         {
             let c = space.warp(head.mesh.points[head.mesh.vertices[*v as usize].point as usize]);
             let cover = hairs.cover(c, &Regions::at(c));
-            // What stands out from the head at the height of the ears is ear; what lies 5 to 20 mm above is scalp.
+            // At the height of the ears, points that stand out from the head are ear; points 5 to 20 mm above them are
+            // scalp.
             if c.x.abs() > 84.0 && c.y < 2.0 && c.y > -54.0 {
                 ear += 1;
                 assert!(cover < 0.1, "{}: {cover} of the ear is covered at {c}", character.name);

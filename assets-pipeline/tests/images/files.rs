@@ -144,7 +144,7 @@ pub(crate) fn webp(codes: &[u8], width: u32, height: u32, exif: Option<Vec<u8>>)
     bytes
 }
 
-/// What a TIFF says about its samples.
+/// Description of the samples in a TIFF.
 #[derive(Clone, Copy)]
 pub(crate) struct Tiff<'a> {
     pub(crate) size: [u32; 2],

@@ -1,4 +1,4 @@
-//! Images as other programs write them: what is read, what is refused, what is told.
+//! Images as other programs write them: accepted, refused and noted cases.
 
 use std::path::{Path, PathBuf};
 

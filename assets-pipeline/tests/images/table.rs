@@ -103,7 +103,7 @@ fn normal(channel: usize, x: usize) -> f32 {
     [slope, 0.0, 1.0][channel] / (1.0 + slope * slope).sqrt()
 }
 
-/// What became of an input, in the words of the reader.
+/// Outcome of an input, in the reader's words.
 fn outcome(file: &Path, how: As) -> String {
     let with = |purpose| ReadOptions { purpose, ..ReadOptions::default() };
     let result = match how {

@@ -1,10 +1,10 @@
-"""Every call into Maya. Nothing here decides anything: what it returns is plain data."""
+"""All calls into Maya. They return plain data and make no decisions."""
 
 import maya.cmds as cmds
 
 
 class MayaHost:
-    """What the rest of the package knows of Maya."""
+    """The package's only interface to Maya."""
 
     def selection(self):
         """Long paths of selected transforms and meshes."""
@@ -51,7 +51,7 @@ class MayaHost:
                 cmds.select(clear=True)
 
     def frames_per_second(self):
-        """Frames a second of the scene's unit of time."""
+        """Frames per second of the scene's unit of time."""
         names = {"game": 15.0, "film": 24.0, "pal": 25.0, "ntsc": 30.0, "show": 48.0, "palf": 50.0, "ntscf": 60.0}
         unit = cmds.currentUnit(query=True, time=True)
         return names.get(unit) or float(unit.replace("fps", "").replace("df", ""))

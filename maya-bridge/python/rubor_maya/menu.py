@@ -1,4 +1,4 @@
-"""What the entries of the menu do."""
+"""The actions of the menu entries."""
 
 from . import live, sequences
 

@@ -7,7 +7,7 @@ use encoding_rs::{Encoding, UTF_8, WINDOWS_1252};
 
 use crate::notes::Notes;
 
-/// The header stands in the first lines.
+/// Number of bytes in which the header is searched.
 const HEADER_BYTES: usize = 4096;
 
 /// The scene as UTF-8. Scenes that are in plain ASCII or UTF-8 are not copied.

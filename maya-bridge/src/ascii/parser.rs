@@ -821,7 +821,7 @@ impl<'a> Parser<'a> {
                 item.line = line;
                 let Some(_count) = self.number()? else { return Ok(()) };
                 item.offsets.clear();
-                // A pointArray has four numbers a point and no unit: Maya's own, the centimetre.
+                // A pointArray has four numbers per point and no unit: Maya's own, the centimetre.
                 while let Some(offset) = self.next_triple()? {
                     self.needed()?;
                     item.offsets.push(offset.map(|c| (c * 0.01) as f32));

@@ -1,4 +1,4 @@
-//! What a scene holds, as far as faces need it.
+//! Contents of a scene, as far as faces need them.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -84,7 +84,7 @@ pub(crate) struct Transform {
     pub(crate) offset_parent: Option<[f64; 16]>,
     pub(crate) inherits: bool,
     pub(crate) visible: bool,
-    /// What this crate writes about a head.
+    /// Attributes that this crate writes for a head.
     pub(crate) facial_appearance: Option<String>,
 }
 
@@ -128,14 +128,14 @@ pub(crate) struct MeshData {
     pub(crate) current_uv_set: Option<String>,
     pub(crate) intermediate: bool,
     pub(crate) hidden: bool,
-    /// Normals point to the other side: what freezing a negative scale leaves behind.
+    /// Normals point to the other side, as after freezing a negative scale.
     pub(crate) opposite: bool,
     pub(crate) holes: usize,
     /// Face ranges of the object groups `iog[instance].og[n]`.
     pub(crate) face_groups: BTreeMap<(u32, u32), Vec<[u32; 2]>>,
 }
 
-/// What a `tweak` node moves, by geometry and point, metres.
+/// Offsets of a `tweak` node, by geometry and point, metres.
 #[derive(Clone, Debug)]
 pub(crate) struct TweakData {
     pub(crate) moves: BTreeMap<u32, BTreeMap<u32, [f32; 3]>>,
@@ -353,7 +353,7 @@ impl Scene {
         candidates.iter().find(matches).copied()
     }
 
-    /// What is connected into an attribute.
+    /// The source connected into an attribute.
     pub(crate) fn source(&self, node: NodeId, attribute: &str) -> Option<&Plug> {
         let index = *self.by_destination.get(&(node, attribute.to_owned()))?;
         Some(&self.connections[index].0)
@@ -373,12 +373,12 @@ impl Scene {
         self.by_source.get(&node).into_iter().flatten().map(|i| &self.connections[*i])
     }
 
-    /// What is connected into a node.
+    /// Sources connected into a node.
     pub(crate) fn inputs(&self, node: NodeId) -> impl Iterator<Item = &(Plug, Plug)> {
         self.into.get(&node).into_iter().flatten().map(|i| &self.connections[*i])
     }
 
-    /// `|group|head|headShape`. A parent always stands before its child, so this ends.
+    /// `|group|head|headShape`. A parent always comes before its child, so this ends.
     pub(crate) fn path(&self, node: NodeId) -> String {
         let mut names = vec![self.nodes[node].name.as_str()];
         let mut at = self.nodes[node].parent;

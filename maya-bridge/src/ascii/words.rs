@@ -1,4 +1,4 @@
-//! What single words of a scene mean: numbers, units, attribute names.
+//! Meaning of single words of a scene: numbers, units, attribute names.
 
 /// Short name of an attribute that scenes also write long.
 pub(crate) fn short(name: &str) -> &str {
@@ -132,7 +132,7 @@ pub(super) fn number(word: &[u8]) -> Option<f64> {
         }
     }
     let text = std::str::from_utf8(word).ok()?;
-    // Words such as "inf" and "nan" are numbers to Rust and to Maya ("nan" stands in broken scenes).
+    // Words such as "inf" and "nan" are numbers to Rust and to Maya ("nan" occurs in broken scenes).
     text.parse::<f64>().ok().filter(|n| n.is_finite())
 }
 
@@ -151,7 +151,7 @@ pub(super) fn metres(unit: &str) -> Option<f64> {
     })
 }
 
-/// Frames a second of a unit of time.
+/// Frames per second of a unit of time.
 pub(crate) fn fps(unit: &str) -> Option<f64> {
     Some(match unit {
         "game" => 15.0,

@@ -32,7 +32,7 @@ struct Tangent {
     y: f64,
 }
 
-/// Most frames that the curves of a scene are sampled at: 52 weights for 26 minutes at 60 a second.
+/// Largest number of frames at which the curves of a scene are sampled: 52 weights for 26 minutes at 60 per second.
 pub(super) const MOST_BAKED_FRAMES: f64 = 5_000_000.0;
 
 const FIXED: u32 = 1;
@@ -61,7 +61,7 @@ impl Default for Baking {
 }
 
 impl Baking {
-    /// True if a segment of so many frames is to be sampled.
+    /// True if a segment of this many frames is sampled.
     pub(super) fn segment(&mut self, frames: f64) -> bool {
         let fits = frames <= self.frames_left;
         if fits {
@@ -75,7 +75,7 @@ impl Baking {
 }
 
 impl Curve {
-    /// `fps`: units of time in a second. `unit`: what the written values are multiplied by; stored tangents are in
+    /// `fps`: units of time in a second. `unit`: factor of the written values; stored tangents are in
     /// seconds and in the unit that results.
     pub(super) fn new(data: &CurveData, fps: f64, unit: f64) -> Option<Self> {
         let mut keys: Vec<Knot> = Vec::with_capacity(data.keys.len());
@@ -120,7 +120,7 @@ impl Curve {
         (self.keys[b].value - self.keys[a].value) / (self.keys[b].time_s - self.keys[a].time_s)
     }
 
-    /// Slope of a tangent at key `i`, value a second; `out` is the side after the key.
+    /// Slope of a tangent at key `i`, value per second; `out` is the side after the key.
     fn slope(&self, i: usize, out: bool) -> f64 {
         let key = &self.keys[i];
         let tangent = if out { key.outward } else { key.inward };

@@ -234,7 +234,7 @@ impl<'s> Assembly<'s> {
         }
     }
 
-    /// Name, material and faces of each object group; what is in none is a part of its own.
+    /// Name, material and faces of each object group; faces in no group are a part of their own.
     fn groups(&self, instance: &Instance, face_count: usize) -> Vec<(String, Material, Vec<u32>)> {
         let scene = self.scene;
         let mesh = instance.mesh;
@@ -437,7 +437,7 @@ impl<'s> Assembly<'s> {
         let mut number = 1;
         loop {
             let same_node = |i: &usize| self.weights[*i].node == node;
-            // Two deformers of one mesh are two weights, whatever their names.
+            // Two deformers of one mesh are two weights, even with equal names.
             let here = |i: &usize| self.shapes[*i].1.range(first_point..).next().is_some();
             match self.driven.get(&name) {
                 None if !self.between.contains_key(&name) => break,

@@ -15,7 +15,7 @@ use rubor_rig::timeline::Sequence;
 use crate::ascii::parser;
 use crate::error::ReadError;
 
-/// What to read of a scene.
+/// Parts of a scene to read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// Only meshes whose path contains this, such as `|head_grp|`; by default all visible ones that are no targets.
@@ -29,11 +29,12 @@ pub struct Imported {
     pub head: Head,
     /// Keyed weights and the motion of the head; none without keys.
     pub sequence: Option<Sequence>,
-    /// In-between targets: their shapes stand in the head, a rig needs these entries.
+    /// In-between targets: their shapes are in the head, and a rig needs these entries.
     pub inbetweens: Vec<Inbetween>,
     /// The rig file that a scene of ours carries.
     pub rig: Option<serde_json::Value>,
-    /// What was left out, guessed or repaired, and why: one line per kind, with a count and the first names.
+    /// Notes on everything that was left out, guessed or repaired, and why: one line per kind, with a count and the
+    /// first names.
     pub notes: Vec<String>,
 }
 

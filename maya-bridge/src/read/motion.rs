@@ -20,7 +20,7 @@ const MOST_FRAMES: f64 = 1_000_000.0;
 /// A weight as a sequence has it.
 enum Played {
     Constant(f64),
-    /// A curve and what its values are multiplied by.
+    /// A curve and the factor of its values.
     Scaled(Curve, f64),
     /// Two curves and what their product is multiplied by.
     Product([Curve; 2], f64),
@@ -235,7 +235,7 @@ impl Mover<'_> {
     }
 }
 
-/// Attributes of a transform that place what is below it, beside the nine channels.
+/// Attributes of a transform that place its children, besides the nine channels.
 const PLACING: [&str; 12] = ["t", "r", "s", "sh", "opm", "ro", "rp", "rpt", "sp", "spt", "jo", "ra"];
 
 fn movers<'s>(scene: &'s Scene, built: &Built<'_>, notes: &mut Notes) -> Vec<Mover<'s>> {
@@ -353,7 +353,7 @@ fn together(tracks: &[Track<f32>]) -> Track<[f32; 3]> {
     Track::Keys(times.into_iter().map(|t| Key { t, v: value(t), ease: Default::default() }).collect())
 }
 
-/// Motion of the whole head frame by frame, relative to where it stands in the scene.
+/// Motion of the whole head frame by frame, relative to its place in the scene.
 fn bake(
     scene: &Scene,
     movers: &[Mover<'_>],

@@ -1,5 +1,5 @@
-//! What moves a weight of a blend shape: its value or curve, the envelope and the state of the node, what the shape
-//! editor hides.
+//! Sources that move a weight of a blend shape: its value or curve, the envelope and the state of the node, what the
+//! shape editor hides.
 
 use crate::ascii::scene::{BlendShapeData, CurveData, Data, NodeId, Plug, Scene};
 use crate::ascii::words::short;
@@ -31,7 +31,7 @@ impl PartialEq for Drive<'_> {
     }
 }
 
-/// What a weight does: `weight x envelope x factor`.
+/// Effect of a weight: `weight x envelope x factor`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Effect<'s> {
     pub(super) weight: Drive<'s>,
@@ -80,7 +80,7 @@ fn weight_index(data: &BlendShapeData, attribute: &str) -> Option<u32> {
         .or_else(|| data.aliases.iter().find(|(_, alias)| short(alias) == attribute).map(|(index, _)| *index))
 }
 
-/// What moves a weight.
+/// The source that moves a weight.
 pub(super) fn effect<'s>(scene: &'s Scene, node: NodeId, data: &BlendShapeData, index: u32) -> Effect<'s> {
     let (indexed, alias) = weight_names(data, index);
     let stored = data.weights.get(&index).copied().unwrap_or(0.0);
@@ -100,7 +100,7 @@ pub(super) fn effect<'s>(scene: &'s Scene, node: NodeId, data: &BlendShapeData, 
     }
 }
 
-/// Says what of a blend shape changes its weights, and what is not evaluated. `between`: it has in-betweens.
+/// Notes which parts of a blend shape change its weights, and which are not evaluated. `between`: it has in-betweens.
 pub(super) fn tell(scene: &Scene, node: NodeId, data: &BlendShapeData, between: bool, notes: &mut Notes) {
     let this = &scene.nodes[node];
     match this.state {

@@ -213,7 +213,7 @@ impl Animation {
     }
 }
 
-/// One value a frame as a track.
+/// A track of one value per frame.
 fn keyed(values: &[f32], fps: f64) -> Track<f32> {
     match values.first() {
         Some(first) if values.iter().any(|v| v != first) => Track::Keys(
@@ -307,7 +307,7 @@ fn frame_of(t: f64, fps: f64) -> f64 {
     candidates.into_iter().find(|f| f / fps == t).unwrap_or(frame)
 }
 
-/// Maya's name for a frame rate, and the rate that it stands for.
+/// Maya's name for a frame rate, and its rate.
 pub(super) fn time_unit(fps: f64, notes: &mut Vec<String>) -> (String, f64) {
     const WHOLE: [u32; 40] = [
         2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 40, 75, 80, 90, 100, 120, 125, 150, 200, 240, 250, 300, 375, 400,
@@ -336,7 +336,7 @@ pub(super) fn time_unit(fps: f64, notes: &mut Vec<String>) -> (String, f64) {
         return (format!("{fps}fps"), fps);
     }
     notes.push(format!(
-        "Maya has no rate of {fps} frames a second: the scene is at 24, with keys between frames"
+        "Maya has no rate of {fps} frames per second: the scene is at 24, with keys between frames"
     ));
     ("film".into(), 24.0)
 }

@@ -29,7 +29,7 @@ use crate::plain_name;
 
 pub use rubor_assets::export::Performance;
 
-/// What to write beside the geometry.
+/// Data to write besides the geometry.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// sRGB colour of the neutral skin in the head's texture space, for the viewport.
@@ -47,7 +47,7 @@ pub struct Scene {
     pub text: String,
     /// Name and content of textures and shader.
     pub files: Vec<(String, Vec<u8>)>,
-    /// What had to be changed.
+    /// Notes on everything that had to be changed.
     pub notes: Vec<String>,
 }
 
@@ -75,7 +75,7 @@ fn commit(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let partial = path.with_file_name(format!(".partial-{name}"));
     std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path)).map_err(|source| {
-        // Nothing to do when the partial file cannot be removed either: the first error says why.
+        // If the partial file cannot be removed either, the first error is the one to report.
         let _ = std::fs::remove_file(&partial);
         WriteError::Write { path: path.to_owned(), source }
     })

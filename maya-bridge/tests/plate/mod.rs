@@ -61,7 +61,7 @@ impl Scene {
         self
     }
 
-    /// What stands behind all connections.
+    /// The source behind all connections.
     pub(crate) fn last(mut self, text: &str) -> Self {
         self.last += text;
         self

@@ -1,4 +1,4 @@
-//! `rubor adapters`: what can draw here.
+//! `rubor adapters`: lists the graphics adapters of this machine.
 
 use rubor::{Outcome, studio};
 

@@ -1,4 +1,4 @@
-//! `rubor bench`: GPU time of each pass, frames drawn back to back.
+//! `rubor bench`: GPU time of each pass, of frames drawn back to back.
 
 use std::path::PathBuf;
 
@@ -17,16 +17,16 @@ pub(crate) struct Arguments {
     /// Head (.glb, .gltf) [default: the built-in head]
     #[arg(long, value_name = "FILE")]
     head: Option<PathBuf>,
-    /// Sequence (.json) of which one moment is drawn [default: the demo, close enough for the head to fill the frame]
+    /// Sequence (.json) of which one frame is drawn [default: the demo, close enough for the head to fill the frame]
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
-    /// That moment, seconds
+    /// Time of that frame, seconds
     #[arg(long, default_value_t = 5.0)]
     time: f64,
-    /// Frames that are timed
+    /// Timed frames
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
-    /// Frames before them that are not
+    /// Warm-up frames before them, not timed
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(..=10_000))]
     warm_up: u32,
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)

@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
     /// Frame numbers in per second of the timecodes, where the recording does not show it (59.94 counts as such)
     #[arg(long, value_name = "RATE")]
     timecode_rate: Option<f64>,
-    /// Tell which tracks this head (.glb) has no shape for
+    /// List the tracks for which this head (.glb) has no shape
     #[arg(long, value_name = "FILE")]
     head: Option<PathBuf>,
 }

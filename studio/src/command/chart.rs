@@ -15,10 +15,10 @@ pub(crate) struct Arguments {
     /// Sequence (.json) whose first frame is drawn [default: the demo]
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
-    /// Batches of 65 536 samples of reference-surface, which holds the light through thin parts
+    /// Batches of 65 536 samples of reference-surface, which includes the light through thin parts
     #[arg(long, default_value_t = 64)]
     batches: u32,
-    /// Frames of which the GPU time is the median; as many are drawn before them
+    /// Timed frames, of which the median counts; as many warm-up frames are drawn before them
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(..=10_000))]
     frames: u32,
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)

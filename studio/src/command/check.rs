@@ -1,4 +1,4 @@
-//! `rubor check`: what is wrong with files, what has no effect, and why a wrinkle does not show.
+//! `rubor check`: finds faults in files, entries without effect, and the reason why a wrinkle does not show.
 
 use std::path::{Path, PathBuf};
 
@@ -18,8 +18,8 @@ use rubor::{Failure, Outcome};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Heads (.glb, .gltf, .ma, .usda), rigs, sequences, retarget files (.json), recordings (.csv, .json); what is given
-    /// together is checked together
+    /// Heads (.glb, .gltf, .ma, .usda), rigs, sequences, retarget files (.json), recordings (.csv, .json); files that
+    /// are given together is checked together
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Fail on warnings too
@@ -30,7 +30,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What a file is.
+/// Kind of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Kind {
@@ -66,7 +66,7 @@ struct Report {
 
 /// A head and the rig and sequence that came with it.
 struct Subject {
-    /// Index of its report; none for the built-in head.
+    /// Index of its report; `None` for the built-in head.
     report: Option<usize>,
     head: Head,
     rig: Option<Rig>,
@@ -154,7 +154,7 @@ fn together(
         (given, _) => given.iter().map(|(i, sequence)| (Some(*i), sequence)).collect(),
     };
     for (of_rig, rig) in &rigs {
-        // The default rig names more than a head must have: what it lacks is no fault of either.
+        // The default rig has optional names; missing ones are no fault of the head or of the rig.
         if let Some(i) = of_rig {
             reports[*i].findings.append(&mut check::performance::check_rig(&subject.head, rig));
         }
@@ -180,7 +180,7 @@ fn together(
     Ok(())
 }
 
-/// By the name, and for JSON by what stands in it.
+/// By the file name, and for JSON by the contents.
 fn kind(file: &Path) -> Outcome<Kind> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     if !file.is_file() {
@@ -266,7 +266,7 @@ fn parsed<T>(
     load(&report.file).map_err(|e| report.findings.push(check::performance::of_error(&e))).ok()
 }
 
-/// With the recording that it names.
+/// Reads a sequence with the recording that it names.
 fn sequence(report: &mut Report) -> Option<Sequence> {
     let mut sequence = parsed(report, Sequence::load)?;
     let folder = report.file.parent().unwrap_or(Path::new("")).to_owned();
@@ -299,7 +299,7 @@ fn as_note(finding: &Finding) -> Note {
         Severity::Note => "  note",
     };
     let fix = finding.fix.as_ref().map(|fix| format!("\n    fix: {fix}")).unwrap_or_default();
-    // A name in the place tells findings apart as one in the message does; a line only says where the first one is.
+    // Findings differ by a name in the place as by one in the message; the line is that of the first finding.
     if finding.at.starts_with("line ") {
         let place = format!("{}: ", finding.at);
         return Note { about: word.into(), place, message: format!("{}{fix}", finding.message) };

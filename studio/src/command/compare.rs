@@ -1,4 +1,4 @@
-//! `rubor compare A B`: how far two images, or the images of two folders, are apart.
+//! `rubor compare A B`: measures the difference of two images, or of the images of two folders.
 
 use std::path::{Path, PathBuf};
 
@@ -13,12 +13,12 @@ use super::{console, print_json};
 pub(crate) struct Arguments {
     /// Image (PNG, TIFF, EXR) or folder to judge
     test: PathBuf,
-    /// Image or folder that is right
+    /// Reference image or folder
     reference: PathBuf,
     /// Picture of the visible differences (PNG; for folders, a folder)
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Pixels in a degree of vision, for FLIP
+    /// Pixels per degree of vision, for FLIP
     #[arg(long, default_value_t = flip::PIXELS_PER_DEGREE, value_name = "PIXELS")]
     pixels_per_degree: f64,
     /// Fail with exit code 1 when the mean of FLIP is larger
@@ -87,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     }
 }
 
-/// Images of the reference folder with their namesakes.
+/// Images of the reference folder with the images of the same name.
 fn folder_pairs(test: &Path, reference: &Path) -> Outcome<Vec<(String, PathBuf, PathBuf)>> {
     let wrong = |e: std::io::Error| Failure::read(reference, e);
     let mut pairs = Vec::new();

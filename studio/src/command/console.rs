@@ -1,6 +1,6 @@
 //! What the command prints: results on standard output, remarks, progress and errors on standard error.
 //!
-//! A closed pipe (`rubor check x | head`) is no error: the command stops and says nothing.
+//! A closed pipe (`rubor check x | head`) is not an error: the command stops without a message.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, IsTerminal, Write};
@@ -10,7 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rubor::notes::{Note, summed};
 use rubor::{Failure, Outcome, Watch};
 
-/// Prints a line of the result; returns from the function if nobody reads it any more.
+/// Prints a line of the result; returns from the function if the pipe is closed.
 macro_rules! say {
     ($($text:tt)*) => { $crate::command::console::line(format_args!($($text)*))? };
 }
@@ -26,13 +26,13 @@ pub(crate) fn line(text: Arguments<'_>) -> Outcome {
     })
 }
 
-/// A line on standard error. Where that is closed, there is nobody to tell.
+/// A line on standard error. A closed standard error is ignored.
 pub(crate) fn error_line(text: Arguments<'_>) {
     let mut out = std::io::stderr().lock();
     let _ = out.write_fmt(text).and_then(|()| out.write_all(b"\n"));
 }
 
-/// Remarks on standard error, those of one kind in one line.
+/// Prints remarks on standard error, one line per kind.
 pub(crate) fn notes(notes: &[Note]) {
     for note in summed(notes) {
         error_line(format_args!("note: {note}"));
@@ -49,11 +49,11 @@ pub(crate) struct Progress {
     started: Option<Instant>,
 }
 
-/// Plain lines over the whole work.
+/// Number of plain lines over the whole work.
 const LINES: u64 = 8;
 
 impl Progress {
-    /// Progress of work that starts now; `what` is a plural such as `frames`.
+    /// Starts to show progress; `what` is a plural such as `frames`.
     pub(crate) fn new(what: &'static str, total: u64) -> Self {
         let mut progress = Self::default();
         progress.begin(what, total);

@@ -1,4 +1,4 @@
-//! `rubor demo`: the main job on the built-in head.
+//! `rubor demo`: renders the demo sequence on the built-in head.
 
 use rubor::Outcome;
 

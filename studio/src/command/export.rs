@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     /// Bake blood and wrinkles of one pose into the pictures: a time in seconds, or an expression or state
     #[arg(long, value_name = "TIME|NAME")]
     bake: Option<String>,
-    /// How far weights may be from the performance where keys are left out; 0 keeps every authored key
+    /// Largest error of weights when keys are left out; 0 keeps every authored key
     #[arg(long, default_value_t = 1e-5, value_name = "WEIGHT", value_parser = parse_tolerance)]
     tolerance: f32,
     /// Straight lines between more keys instead of cubics, for programs that drop the slopes of keys (Blender)
@@ -47,10 +47,10 @@ pub(crate) struct Arguments {
     /// Pictures for other programs: png, jpeg, or webp (.glb only)
     #[arg(long, default_value = "jpeg", value_name = "FORMAT", value_parser = parse_textures)]
     textures: TextureFormat,
-    /// Only the N shapes that move most, for viewers that keep few
+    /// Only the N shapes that move most, for viewers with a limit
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     top_shapes: Option<u32>,
-    /// No colour of shapes for viewers that do not know the extension
+    /// No vertex colours per shape, which viewers without the extension would show
     #[arg(long)]
     no_colors: bool,
     /// Smaller file: maps as JPEG, no normals of shapes for other viewers

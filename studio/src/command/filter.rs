@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     /// The new image (.png or .exr), or a folder; files that exist are replaced
     #[arg(short, long)]
     output: PathBuf,
-    /// What makes an edge: luma (fast), or color (also between colours of equal luma)
+    /// Source of edges: luma (fast), or color (also between colours of equal luma)
     #[arg(long, default_value = "luma")]
     mode: EdgeMode,
     /// Quality, from fast to fine
@@ -41,10 +41,10 @@ pub(crate) struct Arguments {
     /// Smallest difference that is an edge, 0.0001 to 0.5 (preset high: 0.1)
     #[arg(long)]
     threshold: Option<f32>,
-    /// What to write: the result, or the edges (red left, green top) or blending weights that lead to it (PNG)
+    /// Image to write: the result, or the edges (red left, green top) or blending weights that lead to it (PNG)
     #[arg(long, default_value = "result")]
     stage: Stage,
-    /// What to do with values of an EXR that are no finite numbers
+    /// How to treat values of an EXR that are not finite
     #[arg(long, default_value = "error")]
     non_finite: NonFinite,
     /// Graphics adapter: its index or a part of its name
@@ -110,9 +110,9 @@ enum Stage {
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum NonFinite {
-    /// Stop and say where the first one is
+    /// Stop and report the place of the first one
     Error,
-    /// Take them for black
+    /// Replace them by black
     Zero,
 }
 
@@ -175,7 +175,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     Err(if is_job { Failure::job(message) } else { Failure::input(message) })
 }
 
-/// Extensions that are read.
+/// Supported extensions.
 const READ: [&str; 6] = ["png", "exr", "jpg", "jpeg", "tif", "tiff"];
 
 fn extension(path: &Path) -> String {
@@ -230,7 +230,7 @@ fn jobs(arguments: &Arguments) -> Outcome<Vec<(PathBuf, PathBuf)>> {
     Ok(jobs)
 }
 
-/// Where an image goes in a folder: its own name; what is not EXR becomes PNG.
+/// Output path of an image in a folder: the same name; formats other than EXR become PNG.
 fn named_like(input: &Path, folder: &Path, as_picture: bool) -> PathBuf {
     let kept = extension(input) == "exr" && !as_picture;
     let name = Path::new(input.file_name().unwrap_or_default());
@@ -327,7 +327,7 @@ impl<'a> Filters<'a> {
             image::ImageBuffer::from_raw(image.width(), image.height(), values).map(DynamicImage::ImageRgba16)
         };
         let filtered = filtered.ok_or_else(|| Failure::job("the filtered image has a wrong size"))?;
-        // Grey stays grey: the three channels were equal and got equal shares.
+        // Grey stays grey: the three channels were equal and had equal weights.
         let filtered = match color {
             ColorType::L8 => {
                 DynamicImage::from(first_channels::<u8, 1, _>(&filtered.to_rgba8(), image::Luma))
@@ -406,7 +406,7 @@ impl<'a> Filters<'a> {
         Ok(report)
     }
 
-    /// Deals with values that are no finite numbers; returns how many were replaced.
+    /// Deals with values that are not finite; returns how many were replaced.
     fn make_finite(&self, picture: &mut Picture, input: &Path) -> Outcome<usize> {
         let width = picture.width;
         let mut replaced = 0;

@@ -1,4 +1,4 @@
-//! `rubor gallery`: one page that shows what a head, the expressions, the lights and the characters look like.
+//! `rubor gallery`: one page of pictures of a head, the expressions, the lights and the characters.
 
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Print what stands on the page as JSON
+    /// Print the contents of the page as JSON
     #[arg(long)]
     json: bool,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `rubor import`: other files to a head.
+//! `rubor import`: makes a head from other files.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -42,7 +42,7 @@ enum Source {
     Capture(super::capture::Arguments),
 }
 
-/// What every import needs.
+/// Arguments of every import.
 #[derive(clap::Args)]
 #[group(skip)]
 pub(crate) struct Common {
@@ -71,7 +71,7 @@ struct Makehuman {
     /// Folder that holds mpfb2 and faceunits01
     #[arg(long, value_name = "DIR")]
     data: PathBuf,
-    /// Who to start from: a name that `--character list` shows; the options below change what they name
+    /// Character to start from, a name from `--character list`; the options below change single properties
     #[arg(long, default_value = "default", value_name = "NAME")]
     character: String,
     /// 0 female to 1 male
@@ -195,7 +195,7 @@ fn makehuman(arguments: &Makehuman) -> Outcome {
     finish(import::makehuman::import(&options)?, character.skin(), &arguments.common)
 }
 
-/// Writes the sequence that a file carries, or what was keyed in it.
+/// Writes the sequence that a file carries, or its keyed animation.
 fn write_sequence(sequence: Option<&Sequence>, source: &Path, path: &Path) -> Outcome {
     let Some(sequence) = sequence else {
         let found = format!("{}: found no animation, expected one for --sequence", source.display());

@@ -55,7 +55,7 @@ enum Method {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
-    // JSON is what there is: the flag changes nothing.
+    // The output is always JSON, so the flag changes nothing.
     let _ = arguments.json;
     if let Some(width_mm) = arguments.width_mm {
         let (strength, falloff) = (arguments.strength.0, arguments.falloff.0);

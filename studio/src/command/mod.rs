@@ -110,9 +110,9 @@ fn report(outcome: Outcome) -> ExitCode {
     }
 }
 
-/// Mesa's layer that chooses between several GPUs by the desktop session complains on standard error where there is no
-/// session. It can only be told so by a variable that is set before the process starts, so the process starts once more,
-/// as itself and with the same number.
+/// Mesa's layer that chooses between several GPUs by the desktop session prints a warning on standard error if there is
+/// no session. It can only be disabled by a variable that is set before the process starts, so the process starts once
+/// more, as the same program with the same process id.
 pub(crate) fn without_desktop_noise() {
     #[cfg(target_os = "linux")]
     {
@@ -126,7 +126,7 @@ pub(crate) fn without_desktop_noise() {
         let (name, Ok(program)) = (arguments.next().unwrap_or_default(), std::env::current_exe()) else {
             return;
         };
-        // It returns only if it fails; then the work is done with the noise.
+        // `exec` returns only if it fails; then the command continues with the warning.
         let _ = std::process::Command::new(program).arg0(name).args(arguments).env(SILENCE, "1").exec();
     }
 }

@@ -1,4 +1,4 @@
-//! `rubor profile`: a diffusion profile as JSON, or the table of how far profiles are from photon walks.
+//! `rubor profile`: a diffusion profile as JSON, or the table of the errors of profiles against photon walks.
 
 use rubor_rig::skin::accuracy::{AccuracyOptions, accuracy_table};
 use std::str::FromStr;
@@ -24,7 +24,7 @@ pub(crate) struct Arguments {
     /// Radii at which R(r) is printed
     #[arg(long, default_value_t = 64)]
     points: usize,
-    /// Print how far every model is from a photon walk for skin1 and skin2 instead
+    /// Print the error of every model against a photon walk for skin1 and skin2 instead
     #[arg(long)]
     accuracy: bool,
     /// The output is always JSON; accepted so that every command takes it
@@ -32,7 +32,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Which profile.
+/// Choice of the profile.
 #[derive(clap::Args)]
 pub(crate) struct Choice {
     /// deon-six, jimenez-four (sums of Gaussians), skin1 or skin2 (media of Jensen et al. 2001)
@@ -108,7 +108,7 @@ impl Choice {
         if !self.model.needs_walk() {
             return self.model.profile(&name, &media, None, 0).map_err(Failure::input);
         }
-        // What no walk can answer is found before it is walked.
+        // Media without an answer are refused before the walk.
         let walked = if self.model == ProfileModel::MonteCarlo {
             rgb_media(&coefficients, self.eta).map_err(Failure::input)?
         } else {
@@ -130,7 +130,7 @@ impl Choice {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
-    // JSON is what there is: the flag changes nothing.
+    // The output is always JSON, so the flag changes nothing.
     let _ = arguments.json;
     if arguments.accuracy {
         let photons = arguments.choice.photons;

@@ -23,17 +23,18 @@ pub(crate) struct Arguments {
     /// Sequence (.json) [default: the demo]
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
-    /// Job (.json) to draw: what `job.json` of another run says; flags change what they name
+    /// Job (.json) to draw, such as `job.json` of another run; flags replace single settings
     #[arg(long, value_name = "FILE", conflicts_with_all = ["head", "rig", "sequence"])]
     job: Option<PathBuf>,
-    /// Lights in place of the sequence's: three-point, window, backlit-ear, low-key, soft-box, sky, or a sequence file
+    /// Lights that replace those of the sequence: three-point, window, backlit-ear, low-key, soft-box, sky, or a
+    /// sequence file
     #[arg(long, value_name = "NAME|FILE")]
     lights: Option<String>,
     #[command(flatten)]
     shared: Shared,
 }
 
-/// What `render` and `demo` have in common.
+/// Arguments that `render` and `demo` share.
 #[derive(clap::Args)]
 #[group(skip)]
 pub(crate) struct Shared {
@@ -43,7 +44,7 @@ pub(crate) struct Shared {
     /// Frames per second [default: the sequence's]
     #[arg(long)]
     fps: Option<f64>,
-    /// Draw a map of the moment of the (first) head into a corner
+    /// Draw a map of the (first) head's current state into a corner
     #[arg(long, value_enum, value_name = "MAP")]
     inset: Option<inset::Map>,
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
@@ -109,7 +110,7 @@ impl Shared {
         self.run(job, &heads)
     }
 
-    /// Draws a job with what flags change.
+    /// Draws a job with the changes by flags.
     fn run(&self, mut job: Job, heads: &[LoadedHead]) -> Outcome {
         self.settings.overlay(&mut job.settings)?;
         job.sequence.fps = self.fps.unwrap_or(job.sequence.fps);

@@ -8,13 +8,13 @@ use super::print_json;
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Which file the schema is for
+    /// File that the schema describes
     of: Kind,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Kind {
-    /// What to draw, and how: job.json
+    /// Contents and settings of a run: job.json
     Job,
     /// How frames are made: `settings` in job.json and stats.json
     Settings,
@@ -22,7 +22,7 @@ enum Kind {
     Rig,
     /// Tracks, camera and lights: sequence.json
     Sequence,
-    /// What a job, a benchmark, a chart or a gallery measured: stats.json and --json
+    /// Measurements of a job, a benchmark, a chart or a gallery: stats.json and --json
     Report,
 }
 

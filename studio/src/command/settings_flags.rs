@@ -14,7 +14,7 @@ use rubor::{Failure, Outcome};
 use rubor_renderer::settings::{Leaf, Preset, Settings, leaves};
 use serde_json::{Value, json};
 
-/// What a command takes flags for.
+/// The flags of a command.
 pub(crate) trait Purpose {
     /// Whether each flag takes a list; then every combination is drawn.
     const LISTS: bool = false;
@@ -36,7 +36,7 @@ pub(crate) struct SettingsFlags<P> {
     purpose: PhantomData<P>,
 }
 
-/// A setting as clap wants it.
+/// A setting with the strings in the form that clap needs.
 struct Flag {
     leaf: &'static Leaf,
     name: String,
@@ -78,7 +78,7 @@ fn text(leaf: &Leaf, value: &Value) -> String {
     }
 }
 
-/// The values that a text means: several only where lists are taken, and not of a setting that is a list itself.
+/// The values of a text: several only where lists are taken, and not of a setting that is a list itself.
 fn parse(leaf: &Leaf, text: &str, lists: bool) -> Result<Vec<Value>, String> {
     if !lists || leaf.is_list {
         return Ok(vec![leaf.parse(text)?]);
@@ -133,7 +133,7 @@ impl<P: Purpose> SettingsFlags<P> {
         Ok(lists)
     }
 
-    /// The preset, for what a job file leaves out.
+    /// The preset, for settings that a job file leaves out.
     pub(crate) fn preset(&self) -> Option<Preset> {
         self.preset
     }

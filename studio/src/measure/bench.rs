@@ -18,14 +18,14 @@ use crate::studio::Studio;
 pub struct Frames {
     /// Those that are timed.
     pub timed: u32,
-    /// Those before them, so that the clock of the device is up.
+    /// Warm-up frames before them, which raise the clock of the device.
     pub warm_up: u32,
 }
 
-/// Times a shot of the one head of a studio with each settings; `told` gets each row as soon as it is there.
+/// Times a shot of the one head of a studio with each settings; `told` gets each row as soon as it is measured.
 ///
 /// # Errors
-/// A device without timestamps; what the studio refuses; what `told` returns.
+/// A device without timestamps; errors of the studio and of `told`.
 pub fn run(
     studio: &mut Studio,
     shot: &Shot,

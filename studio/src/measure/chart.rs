@@ -22,40 +22,40 @@ use crate::output;
 use crate::report::{ChartReport, ChartRow, median};
 use crate::studio::{Frame, Studio};
 
-/// How to measure.
+/// Options of a chart.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Batches of 65 536 samples of `reference-surface`.
     pub batches: u32,
-    /// Frames of which the GPU time is the median; as many are drawn before them.
+    /// Timed frames, of which the median counts; as many warm-up frames are drawn before them.
     pub frames: u32,
     /// Folder for pictures of each method, its visible differences from `reference-surface`, and its diffuse light.
     pub folder: Option<PathBuf>,
 }
 
-/// What is right for all settings that differ in their scattering and light through thin parts only.
+/// The reference for all settings that differ only in scattering and transmittance.
 struct Truth {
     /// The settings with which `reference-surface` was drawn.
     settings: Settings,
     surface: Frame,
     diffuse: Vec<[f32; 4]>,
-    /// Of the frame's own pixels.
+    /// Mask of the frame's own pixels.
     is_skin: Vec<bool>,
-    /// Of the picture's: all that was averaged into it is skin.
+    /// Mask of the picture's pixels: all averaged pixels are skin.
     is_skin_in_picture: Vec<bool>,
 }
 
-/// Charts settings on a shot of the one head of a studio. In front of the first of those that differ in their scattering
-/// only, a row tells how far `reference-screen` is from `reference-surface`.
+/// Charts settings on a shot of the one head of a studio. A row before the first of the settings that differ in
+/// scattering only gives the error of `reference-screen` against `reference-surface`.
 ///
 /// # Errors
-/// What the studio refuses; files that cannot be written.
+/// Errors of the studio; files that cannot be written.
 pub fn run(studio: &mut Studio, shot: &Shot, all: &[Settings], options: &Options) -> Outcome<ChartReport> {
     let shots = std::slice::from_ref(shot);
     if let Some(folder) = &options.folder {
         output::folder(folder)?;
     }
-    // Rows in their order, each with the place of its truths.
+    // Rows in their order, each with the index of its references.
     let mut truths: Vec<Truth> = Vec::new();
     let mut screens: Vec<(Settings, Vec<[f32; 3]>)> = Vec::new();
     let mut rows = Vec::new();
@@ -129,7 +129,7 @@ pub fn run(studio: &mut Studio, shot: &Shot, all: &[Settings], options: &Options
     Ok(ChartReport { adapter: studio.adapter(), surface_noise: noise.reduce(f64::max), methods: rows })
 }
 
-/// The integral over the surface holds the light from behind.
+/// The integral over the surface includes the light from behind.
 fn surface_of(settings: &Settings, batches: u32) -> Settings {
     let mut surface = settings.clone();
     surface.quality.scatter = ScatterMethod::ReferenceSurface(batches);
@@ -168,7 +168,7 @@ fn scatter_ms(studio: &mut Studio, shot: &Shot, settings: &Settings, frames: u32
         return Ok(None);
     }
     let of_scatter = |(name, _): &&(&'static str, f64)| name.starts_with("scatter");
-    // As many frames before, so that the clock is up.
+    // As many warm-up frames, which raise the clock of the device.
     let times = studio.measure(shot, settings, frames, frames)?;
     let mut ms: Vec<f64> = times
         .iter()

@@ -1,4 +1,4 @@
-//! How far pictures are apart.
+//! Differences of pictures.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::notes::Note;
 pub struct Difference {
     /// Of linear light, over all pixels.
     pub relative_rmse: f64,
-    /// Mean of squared errors, each relative to the square of what is right.
+    /// Mean of squared errors, each relative to the square of the reference.
     pub rel_mse: f64,
     /// Mean of the visible difference.
     pub flip_mean: f64,

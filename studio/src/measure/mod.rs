@@ -30,7 +30,7 @@ pub fn product(base: &Settings, lists: &[Vec<Value>]) -> crate::Outcome<Vec<Sett
     Ok(all)
 }
 
-/// A name for each of several settings: the values of what is `always` told (as flags), and of what differs.
+/// A name for each of several settings: the values of the flags in `always`, and of those that differ.
 pub(crate) fn names(all: &[Settings], always: &[&str]) -> Vec<String> {
     let values: Vec<Value> = all.iter().map(|s| serde_json::to_value(s).unwrap_or_default()).collect();
     let of = |value: &Value, leaf: &Leaf| value[&leaf.path[0]][&leaf.path[1]].clone();
@@ -44,7 +44,7 @@ pub(crate) fn names(all: &[Settings], always: &[&str]) -> Vec<String> {
             list.iter().map(Value::to_string).collect::<Vec<_>>().join("x")
         }
         Value::Object(profile) => profile["name"].as_str().unwrap_or("profile").to_owned(),
-        // A bare number says nothing.
+        // A bare number needs the name of its setting.
         other => format!("{} {other}", leaf.flag()),
     };
     values

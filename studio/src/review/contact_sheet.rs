@@ -5,13 +5,13 @@ use image::imageops::{FilterType, resize};
 
 /// Frames on a page.
 const MOST: usize = 48;
-/// Frames in a row.
+/// Frames per row.
 const COLUMNS: u32 = 8;
 /// Width of a small frame, pixels.
 const WIDTH: u32 = 200;
 const GAP: u32 = 4;
 
-/// Which frames of `count` stand on the page, ascending.
+/// Indices of the frames, of `count`, that the page shows, ascending.
 pub fn choose(count: u32) -> Vec<u32> {
     let n = (count as usize).min(MOST);
     (0..n).map(|i| (i * count as usize / n.max(1)) as u32).collect()

@@ -1,4 +1,4 @@
-//! A small map of the moment in a corner of a frame, as in the figures of papers/004 chapter 7.
+//! A small map of the current state in a corner of a frame, as in the figures of papers/004 chapter 7.
 
 use clap::ValueEnum;
 use glam::Vec2;
@@ -30,13 +30,13 @@ const FACE: [&str; 6] = ["trichion", "menton", "gonion-left", "gonion-right", "z
 /// Grey around the skin.
 const BACKGROUND: u8 = 255;
 
-/// Which map.
+/// Choice of the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Map {
-    /// Blood of the moment: dark is more, as in the thesis
+    /// Current blood: dark is more, as in the thesis
     Hemoglobin,
-    /// Weight of the wrinkles of the moment: white is full
+    /// Current weight of the wrinkles: white is full
     Wrinkles,
 }
 
@@ -72,7 +72,7 @@ impl Inset {
             neutral.values.iter().zip(&skin.mapped).filter(|(_, m)| **m).map(|(v, _)| *v).collect();
         sorted.sort_by(f32::total_cmp);
         let high = sorted.get(sorted.len() * 95 / 100).copied().unwrap_or(0.01);
-        // Only what the blend reads: the geometry is not copied.
+        // Copies only the data that the blend reads, not the geometry.
         let crop = face(head).unwrap_or_else(|| bounds(&skin));
         let head = Head { maps: head.maps.clone(), ..Head::default() };
         Ok(Self { map, head, neutral, skin, crop, black: (BLACK * high).max(1e-4) })

@@ -1,4 +1,4 @@
-//! What people look at: contact sheets, maps in a corner of a frame, videos.
+//! Pictures for reviews: contact sheets, maps in a corner of a frame, videos.
 
 pub mod contact_sheet;
 pub mod inset;

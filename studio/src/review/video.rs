@@ -1,4 +1,4 @@
-//! Frames to an MP4 by way of the ffmpeg program, where there is one.
+//! Encodes frames to an MP4 with the program ffmpeg, if it is installed.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -6,9 +6,9 @@ use std::process::{Command, Stdio};
 use crate::error::{Failure, Outcome};
 use crate::output;
 
-/// What came of it.
+/// Outcome of encoding.
 pub enum Video {
-    /// The file is there.
+    /// The file was written.
     Written,
     /// There is no ffmpeg on this machine.
     NoEncoder,
@@ -30,7 +30,7 @@ pub fn encode(folder: &Path, first: u32, fps: f64, path: &Path) -> Outcome<Video
             .args(["-y", "-loglevel", "error", "-start_number", &first.to_string()])
             .args(["-framerate", &fps.to_string(), "-i"])
             .arg(folder.join("frame.%04d.png"))
-            // yuv420p wants even sides.
+            // yuv420p needs even sides.
             .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv"])
             .args(["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p"])
             .args(["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1"])

@@ -12,7 +12,7 @@ const UNSIGNED_SHORT: u32 = 5123;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// What a view is for, where glTF wants to know.
+/// Purpose of a view, where glTF requires one.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Target {
     None,

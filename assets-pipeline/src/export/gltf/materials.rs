@@ -1,4 +1,4 @@
-//! Materials for viewers that do not know the extension: one a part.
+//! Materials for viewers that do not know the extension: one per part.
 
 use rubor_rig::head::{Head, Material};
 use serde_json::{Value, json};

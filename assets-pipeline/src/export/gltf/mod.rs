@@ -36,7 +36,7 @@ use super::{TextureFormat, write_whole};
 use crate::error::ExportError;
 use crate::facial_appearance::{FacialAppearance, NAME, ShapeOcclusionEntry, VERSION};
 
-/// What goes into the file beside the head.
+/// Contents of the file besides the head.
 #[derive(Clone, Debug)]
 pub struct Options<'a> {
     /// Largest side of the skin's base colour, which is baked from the chromophores; 0 leaves it out.
@@ -90,7 +90,7 @@ impl Default for Options<'_> {
 pub struct Exported {
     /// The `.glb`.
     pub bytes: Vec<u8>,
-    /// What has no effect, or could not be kept as it was.
+    /// Notes on everything without effect, or that could not be kept as it was.
     pub notes: Vec<String>,
     /// Keys of the animation.
     pub keys: usize,
@@ -217,7 +217,7 @@ fn kept_shapes(head: &Head, options: &Options<'_>) -> Result<Vec<usize>, ExportE
     Ok(kept.clone())
 }
 
-/// glTF's morph targets are sums: what drives a shape by others is in the weights of the animation.
+/// glTF's morph targets are sums: shapes that drive others are resolved into the weights of the animation.
 fn note_baked(rig: &Rig, head: &Head, notes: &mut Vec<String>) {
     let on_head = |name: &String| !rubor_rig::names::Resolver::shapes(head).resolve(name).is_empty();
     let inbetweens = rig.inbetweens.iter().filter(|i| on_head(&i.shape) && on_head(&i.target)).count();

@@ -34,7 +34,7 @@ use super::performance::Performance;
 use super::{TextureFormat, write_whole};
 use crate::error::ExportError;
 
-/// What goes into the file beside the head.
+/// Contents of the file besides the head.
 #[derive(Clone, Debug)]
 pub struct Options<'a> {
     /// Largest side of the skin's base colour; 0 leaves it out.
@@ -80,7 +80,7 @@ pub struct Layer {
     pub text: String,
     /// Name and content of pictures.
     pub files: Vec<(String, Vec<u8>)>,
-    /// What could not be kept.
+    /// Notes on everything that could not be kept.
     pub notes: Vec<String>,
     /// Frames with weights.
     pub keys: usize,

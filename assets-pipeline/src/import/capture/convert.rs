@@ -10,12 +10,12 @@ use super::filter::{median_in, reduce, resample, smooth};
 use super::{MOST_SAMPLES, MOST_VALUES, Recording, Retarget, ShapeTarget, list};
 use crate::error::ImportError;
 
-/// What became of a recording.
+/// Result of converting a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// Samples of the recording.
     pub samples: usize,
-    /// Samples a second of the recording.
+    /// Samples per second of the recording.
     pub rate: f64,
     /// Channel and shape of each track.
     pub mapped: Vec<(String, String)>,
@@ -29,7 +29,7 @@ pub struct Report {
     pub limited: usize,
     /// Keys of all tracks.
     pub keys: usize,
-    /// What is odd about the file.
+    /// Notes on oddities of the file.
     pub notes: Vec<String>,
 }
 

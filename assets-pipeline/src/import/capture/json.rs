@@ -1,4 +1,4 @@
-//! Face tracking as JSON: what scripts around MediaPipe's face landmarker and ARKit write.
+//! Face tracking as JSON, as written by scripts around MediaPipe's face landmarker and ARKit.
 //!
 //! There is no standard, so the shape of the data decides:
 //! - frames: an array, or an object with `frames`, `data` or `results`. Each frame has a time (`timestampMs`,
@@ -21,7 +21,7 @@ use super::timecode::{SECONDS, Timeline, Unit};
 use super::{Channel, HeadAngles, LARGEST, MOST_SAMPLES, MOST_VALUES, Recording, text};
 use crate::error::ImportError;
 
-/// Frames a second where a file has neither times nor a rate.
+/// Frames per second where a file has neither times nor a rate.
 const DEFAULT_FPS: f64 = 30.0;
 
 const FRAMES: [&str; 3] = ["frames", "data", "results"];
@@ -67,7 +67,7 @@ pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Recording, ImportError> {
         None => None,
         Some((name, value)) => match value.as_f64().filter(|f| *f > 0.0 && *f <= 10_000.0) {
             Some(fps) => Some(fps),
-            None => return Err(reader.wrong(name, &value.to_string(), "frames a second")),
+            None => return Err(reader.wrong(name, &value.to_string(), "frames per second")),
         },
     };
     match (first(&root, &COLUMN_NAMES), first(&root, &COLUMN_ROWS)) {

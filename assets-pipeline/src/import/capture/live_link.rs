@@ -187,7 +187,7 @@ fn point<'a>(field: &'a str, commas: &mut bool) -> std::borrow::Cow<'a, str> {
 }
 
 /// A row whose decimal commas were cut as if they separated: each number is two fields, and perhaps the time is. None
-/// where the number of fields or what stands in them says otherwise.
+/// where the number of fields or their contents show otherwise.
 fn join_decimals(row: &ByteRecord, columns: &[Column], names: usize) -> Option<ByteRecord> {
     let values = columns.iter().filter(|c| matches!(c, Column::Value(_))).count();
     let split_time = match row.len().checked_sub(names + values)? {
@@ -281,7 +281,8 @@ fn set_times(
         return Err(ImportError::content(&recording.path, at, format!("frame {frame}"), expected));
     }
     if !shown {
-        let note = "the timecodes are too few to show how many frames a second has: 60, unless a timecode rate is given";
+        let note =
+            "the timecodes are too few to show the frames per second: 60, unless a timecode rate is given";
         recording.notes.push(note.into());
     }
     let numbers: Vec<f64> =

@@ -42,11 +42,11 @@ pub struct Recording {
     pub path: PathBuf,
     /// Seconds since the first sample, strictly increasing; not always evenly spaced.
     pub times_s: Vec<f64>,
-    /// Weights by name as written there, each with one value a sample.
+    /// Weights by name as written there, each with one value per sample.
     pub channels: Vec<Channel>,
     /// Rotation of the head where it was recorded.
     pub head: Option<HeadAngles>,
-    /// What is odd about the file.
+    /// Notes on oddities of the file.
     pub notes: Vec<String>,
 }
 
@@ -76,7 +76,7 @@ impl Recording {
         self.times_s.last().copied().unwrap_or_default()
     }
 
-    /// Samples a second: the median step's inverse, snapped to a common camera rate within 2 %.
+    /// Samples per second: the median step's inverse, snapped to a common camera rate within 2 %.
     pub fn rate(&self) -> f64 {
         const COMMON: [f64; 8] = [24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0];
         let mut steps: Vec<f64> = self.times_s.windows(2).map(|w| w[1] - w[0]).collect();
@@ -90,9 +90,9 @@ impl Recording {
     }
 }
 
-/// Largest recording: an hour at 120 samples a second. What is longer is no take of a face.
+/// Largest recording: an hour at 120 samples per second. A longer file is not a take of a face.
 const MOST_SAMPLES: usize = 432_000;
-/// Most values of a recording, samples times channels: an hour of 52 shapes at 120 samples a second is a third of it.
+/// Most values of a recording, samples times channels: an hour of 52 shapes at 120 samples per second is a third of it.
 const MOST_VALUES: usize = 64 << 20;
 /// Largest weight or angle of a recording.
 const LARGEST: f32 = 1e6;

@@ -29,14 +29,14 @@ use crate::error::ImportError;
 /// Largest gain, offset and limit.
 const MOST_GAIN: f32 = 1000.0;
 
-/// How a recording becomes tracks. What it does not name keeps its own name and its value.
+/// How a recording becomes tracks. Channels that it does not name keep their name and value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", deny_unknown_fields, default)]
 pub struct Retarget {
     /// For whom, in words.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub description: String,
-    /// Where the actor is at rest: the median weights of that time are taken away, and what is left is stretched so
+    /// Where the actor is at rest: the median weights of that time are subtracted, and the rest is scaled so
     /// that a full weight stays full. Angles of the head are only shifted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub neutral: Option<Neutral>,
@@ -46,7 +46,7 @@ pub struct Retarget {
     pub limit: Option<f32>,
     /// Keys that a straight line replaces within this weight (or this many tenths of a degree) are left out.
     pub tolerance: f32,
-    /// Channel as the recording spells it, in any letter case, to what it moves: a shape, several, or null for none.
+    /// Channel as the recording spells it, in any letter case, to its targets: a shape, several, or null for none.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub shapes: BTreeMap<String, Targets>,
     /// Rotation of the head.
@@ -82,7 +82,7 @@ impl Default for Smoothing {
     }
 }
 
-/// What one channel moves. Written as a shape, a list of shapes, or null for none.
+/// Shapes that one channel moves. Written as a shape, a list of shapes, or null for none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Targets(pub Vec<ShapeTarget>);
 
@@ -124,7 +124,7 @@ impl Serialize for Targets {
     }
 }
 
-// By hand and not as untagged enums, so that an error stands at the value that is wrong.
+// Written by hand instead of as untagged enums, so that an error has the place of the wrong value.
 impl<'de> Deserialize<'de> for ShapeTarget {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct TargetVisitor;

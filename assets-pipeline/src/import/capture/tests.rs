@@ -124,7 +124,7 @@ fn wrong_tables_are_refused_with_line_and_column() {
         let error = live(rows).unwrap_err();
         assert!(error.contains(expected) && error.contains("take.csv"), "{error:?} lacks {expected:?}");
     }
-    // What a lost face and a stopped recording leave behind is named, not refused.
+    // The traces of a lost face and of a stopped recording are reported, not refused.
     let recording = live(&[
         "Timecode,BlendShapeCount,JawOpen,MouthClose",
         "0:0:0:0,2,1,0",
@@ -189,7 +189,7 @@ fn resampling_keeps_lines_exactly_and_the_mean_of_what_is_between_frames() {
             assert!((v - expected).abs() < 1e-6, "{fps} fps, frame {i}: {v} for {expected}");
         }
     }
-    // Every other sample at 60 a second: at 20 frames a second the mean, not one of the extremes.
+    // Every other sample at 60 per second: at 20 frames per second the mean, not one of the extremes.
     let flicker: Vec<f32> = (0..121).map(|i| (i % 2) as f32).collect();
     for v in resample(&times, &flicker, 20.0, 40, 60.0).iter().skip(1) {
         assert!((v - 0.5).abs() < 0.1, "{v}");

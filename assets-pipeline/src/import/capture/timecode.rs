@@ -1,9 +1,10 @@
 //! Times of samples: SMPTE timecodes with fractions of a frame, clock times, plain numbers in the unit that their steps
 //! show; and the times of a recording from them.
 //!
-//! Live Link Face writes `HH:MM:SS:FF.fff`, FF in frames of 60 a second (30 in older versions), with `;` before FF
+//! Live Link Face writes `HH:MM:SS:FF.fff`, FF in frames of 60 per second (30 in older versions), with `;` before FF
 //! where the device counts drop frames. Drop frame (SMPTE ST 12-1): numbers 0 and 1 (0 to 3 at 60) are left out at the
-//! start of every minute but each tenth, so that the numbers follow the clock at 30000/1001 (60000/1001) frames a second.
+//! start of every minute but each tenth, so that the numbers follow the clock at 30000/1001 (60000/1001) frames per
+//! second.
 
 /// One written time.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -19,7 +19,7 @@ pub(super) const LAST_S: f32 = 86_400.0;
 /// Most keys that a cubic segment without an easing becomes: lines between them are off by less than 1e-5 of its height.
 const MOST_SAMPLES: f64 = 256.0;
 
-/// What a channel moves.
+/// Target of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Target {
     /// Weights of the mesh of the node.
@@ -40,7 +40,7 @@ enum Interpolation {
     Cubic,
 }
 
-/// What a channel names; its accessors are not yet read.
+/// Names in a channel; its accessors are not yet read.
 #[derive(Clone, Debug)]
 pub(super) struct Named {
     /// `animation 0, channel 2`.
@@ -52,7 +52,7 @@ pub(super) struct Named {
     output: u32,
 }
 
-/// Channels of an animation that name something that is there.
+/// Channels of an animation whose targets exist.
 pub(super) fn of_animation(document: &Document, animation: usize, notes: &mut Notes) -> Vec<Named> {
     let raw = &document.raw["animations"][animation];
     let mut found: Vec<Named> = Vec::new();
@@ -111,7 +111,7 @@ fn index(value: &Value) -> Option<usize> {
 pub(super) struct Channel {
     interpolation: Interpolation,
     pub(super) times_s: Vec<f32>,
-    /// `width` numbers a key; three times as many where it is cubic.
+    /// `width` numbers per key; three times as many where it is cubic.
     numbers: Vec<f32>,
     /// Numbers of a key.
     width: usize,
@@ -164,7 +164,7 @@ impl Channel {
     }
 
     /// Keys by rising time. Of keys at the same time the first ends the way before, the last begins the way after, as
-    /// players show them; keys before 0 shape what is left of their segment and are cut off in [`Channel::track`].
+    /// players show them; keys before 0 shape the rest of their segment and are cut off in [`Channel::track`].
     fn repaired(mut self, at: &str, notes: &mut Notes) -> Self {
         let before = self.times_s.len();
         let mut order: Vec<usize> = (0..before).collect();

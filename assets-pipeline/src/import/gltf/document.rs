@@ -1,7 +1,7 @@
 //! A parsed document with its buffers in memory.
 //!
-//! The `gltf` crate reads meshes, nodes and skins; its checks run first, as its accessors panic on what they find. What it
-//! refuses though a face can be read without is taken out before: animations (read from the JSON, see `channels`),
+//! The `gltf` crate reads meshes, nodes and skins; its checks run first, because its accessors panic on bad data. What
+//! it refuses though a face can be read without is taken out before: animations (read from the JSON, see `channels`),
 //! cameras, attributes of unknown names.
 
 use std::borrow::Cow;
@@ -31,7 +31,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 /// any count. 800 shapes of 50 000 vertices are less.
 const MOST_NUMBERS: usize = 1 << 27;
 
-/// Extensions that change nothing about what is read here, or only how a number is stored.
+/// Extensions that do not change the data read here, or change only how a number is stored.
 const UNDERSTOOD: [&str; 8] = [
     NAME,
     "KHR_mesh_quantization",
@@ -48,7 +48,7 @@ const UNDERSTOOD_FAMILIES: [&str; 4] = ["KHR_materials_", "VRM", "KHR_xmp", "ADO
 /// Document, buffers, and the path for messages.
 pub(super) struct Document {
     pub(super) gltf: gltf::Document,
-    /// As it stands in the file: names of targets and animations are read from here.
+    /// The document as it is in the file: names of targets and animations are read from here.
     pub(super) raw: Value,
     pub(super) buffers: Vec<Vec<u8>>,
     pub(super) path: PathBuf,
@@ -168,7 +168,7 @@ impl Document {
         };
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let file = folder.join(relative);
-        // A link may lead out of the folder: compare what it leads to.
+        // A link may lead out of the folder: compare its target.
         let real = fs::canonicalize(&file).map_err(ImportError::read(&file))?;
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let real_folder = fs::canonicalize(folder).map_err(ImportError::read(folder))?;
@@ -254,7 +254,7 @@ fn is_attribute(name: &str) -> bool {
         || ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"].into_iter().any(numbered)
 }
 
-/// What a file requires must be understood; compressed geometry is refused in words.
+/// Extensions that a file requires must be supported; compressed geometry has its own message.
 fn check_extensions(json: &gltf_json::Root, path: &Path) -> Result<(), ImportError> {
     for (i, name) in json.extensions_required.iter().enumerate() {
         let known = UNDERSTOOD.contains(&name.as_str())

@@ -123,7 +123,7 @@ impl Builder<'_> {
                 if found == count {
                     return Ok(());
                 }
-                Err(document.fail(&at(what), format!("{found} elements"), format!("{count}, one a vertex")))
+                Err(document.fail(&at(what), format!("{found} elements"), format!("{count}, one per vertex")))
             };
             let normals = match primitive.get(&Semantic::Normals) {
                 Some(a) => accessor::floats::<3>(document, &at("NORMAL"), &a)?,
@@ -140,7 +140,7 @@ impl Builder<'_> {
             check("TEXCOORD_0", uvs.len())?;
             let mut targets: Vec<(u32, Vec<[f32; 3]>)> = Vec::new();
             for (t, target) in primitive.morph_targets().enumerate() {
-                // Nothing moves where an accessor has no data.
+                // An accessor without data moves no points.
                 let Some(a) = target.positions().filter(|a| a.view().is_some() || a.sparse().is_some())
                 else {
                     continue;

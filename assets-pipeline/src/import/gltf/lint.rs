@@ -1,4 +1,4 @@
-//! What a glTF document says that no reader will do.
+//! Entries of a glTF document that the reader ignores.
 
 use std::collections::HashSet;
 use std::path::Path;

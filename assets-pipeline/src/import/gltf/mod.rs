@@ -8,7 +8,7 @@
 //! first animation --channels--> tracks by node; default weights where nothing is keyed
 //! ```
 //!
-//! Nothing in a file is trusted: every range is checked before it is read.
+//! File contents are not trusted: every range is checked before it is read.
 
 mod accessor;
 mod channels;
@@ -35,7 +35,7 @@ use crate::error::ImportError;
 use crate::facial_appearance::NAME;
 use crate::notes::{Note, Notes};
 
-/// A head and what its file holds beside it.
+/// A head and the other contents of its file.
 #[derive(Clone, Debug, Default)]
 pub struct ImportedHead {
     /// The head, validated.
@@ -44,10 +44,10 @@ pub struct ImportedHead {
     pub rig: Option<serde_json::Value>,
     /// The sequence file that its animation was made from.
     pub sequence: Option<serde_json::Value>,
-    /// Its first animation that moves the head, as tracks: what other programs keyed. Default weights of meshes and nodes
-    /// are constant tracks, also without an animation.
+    /// Its first animation that moves the head, as tracks that other programs keyed. Default weights of meshes and
+    /// nodes are constant tracks, also without an animation.
     pub animation: Option<Sequence>,
-    /// What was left out, guessed or repaired.
+    /// Notes on everything that was left out, guessed or repaired.
     pub notes: Vec<Note>,
 }
 

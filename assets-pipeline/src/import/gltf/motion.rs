@@ -21,7 +21,7 @@ const DEFAULT_RATE: f64 = 30.0;
 /// Most keys of the motion of the head; longer animations get one every few frames.
 const MOST_KEYS: u32 = 1 << 18;
 
-/// What moves a morph target.
+/// The source that moves a morph target.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Driver {
     /// Keys of the animation.
@@ -164,7 +164,7 @@ impl Motion {
         }
     }
 
-    /// What moves a target of a mesh that a node shows.
+    /// The source that moves a target of a mesh that a node shows.
     pub(super) fn driver(&self, node: Option<usize>, mesh: &Mesh<'_>, target: usize) -> Driver {
         if let Some(track) = node.and_then(|n| self.weights.get(&n)).and_then(|tracks| tracks.get(target)) {
             return Driver::Keyed(track.clone());

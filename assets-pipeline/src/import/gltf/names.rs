@@ -10,7 +10,7 @@ use super::document::Document;
 /// Of a morph target.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct TargetName {
-    /// What the file says, else `target 0` and so on.
+    /// The name in the file, else `target 0` and so on.
     pub(super) text: String,
     /// Whether the file says it.
     pub(super) given: bool,

@@ -92,7 +92,7 @@ fn geometry(
         return Err(document.fail(
             NAME,
             format!("{point_count} points"),
-            format!("at most {vertex_count}, one a vertex"),
+            format!("at most {vertex_count}, one per vertex"),
         ));
     }
     let mut mesh = Mesh { points: vec![Vec3::ZERO; point_count], ..Mesh::default() };
@@ -151,7 +151,7 @@ fn geometry(
             let Some(offsets) = target.positions() else { continue };
             let offsets = accessor::floats::<3>(document, &at(&format!("target {t}")), &offsets)?;
             for (p, offset) in points.iter().zip(offsets) {
-                // Zeros fill what is not stored; -0 only comes from a stored offset.
+                // Values that are not stored are zero; -0 only comes from a stored offset.
                 if offset.iter().any(|c| c.to_bits() != 0) {
                     shapes[t][*p as usize] = Some(Vec3::from_array(offset));
                 }

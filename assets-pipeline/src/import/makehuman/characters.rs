@@ -6,9 +6,9 @@ use crate::synthesize;
 /// A person as parameters of the two generators.
 #[derive(Clone, Copy, Debug)]
 pub struct Character {
-    /// What it is asked for by.
+    /// Name by which it is selected.
     pub name: &'static str,
-    /// Who it is, in a few words.
+    /// A short description.
     pub summary: &'static str,
     ethnicity: [f32; 3],
     gender: f32,
@@ -202,7 +202,7 @@ impl Character {
         CHARACTERS.iter().find(|c| c.name == name)
     }
 
-    /// Geometry, but for the folder of the data.
+    /// Geometry, except the folder of the data.
     pub fn head(&self) -> Options {
         Options {
             name: self.name.into(),

@@ -81,8 +81,8 @@ const BUNCHED: [(&str, f32); 5] =
 /// Skin stays this far off the eyeball there, metres.
 const CLEARANCE: f32 = 0.0011;
 
-/// Takes the skin out of the eyeball where shapes push it in: what is too deep in the combination of [`BUNCHED`] is
-/// added to the shape of the cheek.
+/// Moves the skin out of the eyeball where shapes push it in: points that are too deep in the combination of
+/// [`BUNCHED`] is added to the shape of the cheek.
 pub(super) fn clear_skin(mesh: &PolyMesh, shapes: &mut [Shape], eyes: &[Eye]) {
     let Some(skin) = mesh.groups.iter().position(|g| g == "skin") else { return };
     let mut on_skin = vec![false; mesh.points.len()];

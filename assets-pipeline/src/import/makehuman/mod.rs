@@ -36,7 +36,7 @@ const OFFSET_THRESHOLD: f32 = 2e-5;
 /// Points of the base mesh: files of another topology are refused.
 const POINT_COUNT: usize = 19158;
 
-/// What to build. `Default` is the head that ships with rubor.
+/// Description of the head to build. `Default` is the head that ships with rubor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Folder that holds `mpfb2/` and `faceunits01/`.
@@ -63,7 +63,7 @@ pub struct Options {
     pub lip_seal: f32,
     /// Catmull-Clark steps, 0 to 2.
     pub subdivide: u32,
-    /// Rays a point for ambient occlusion; 0 leaves it out.
+    /// Rays per point for ambient occlusion; 0 leaves it out.
     pub occlusion_rays: u32,
 }
 

@@ -32,7 +32,7 @@ pub(crate) struct ChromophoresArgs {
     /// The file is linear Rec. 709 [default: sRGB for integers, linear for floats]
     #[arg(long)]
     linear: bool,
-    /// Factor that brings the values to reflectance
+    /// Factor from the values to reflectance
     #[arg(long, default_value_t = 1.0)]
     gain: f32,
     /// CIEDE2000 residual above which a texel is out of gamut

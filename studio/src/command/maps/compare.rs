@@ -79,7 +79,7 @@ pub(super) fn run(a: &CompareArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
     let (base, target) = (base.map, target.map);
     let wrong = |e: HemoglobinError| Failure::input(e);
     let exact = match_locally(&base, &target, &mask, a.radius).map_err(wrong)?;
-    // Full resolution: the Gaussian approximation alone. Reduced: with what storage adds.
+    // Full resolution: the Gaussian approximation alone. Reduced: with the error of storage.
     let full_size = width.max(height);
     let approximate = |size: u32| -> Outcome<Map> {
         let n = neutral(&base, &mask, a.radius, size).map_err(wrong)?;

@@ -1,4 +1,4 @@
-//! Where converted maps go: files, or a head.
+//! Destination of converted maps: files, or a head.
 
 use std::path::{Path, PathBuf};
 
@@ -112,12 +112,12 @@ pub(crate) fn write_head(loaded: &LoadedHead, output: &Path, small: bool) -> Out
     Ok(())
 }
 
-/// Measured blood and pigment keep 16 bits: 8 over the range of a map with a mole in it leave few for the skin.
+/// Measured blood and pigment keep 16 bits: 8 over the range of a map with a mole in it leave too few for the skin.
 fn exact() -> MapEncodings {
     MapEncodings { melanin: MapEncoding::Png16, hemoglobin: MapEncoding::Png16, ..MapEncodings::default() }
 }
 
-/// File names for a provenance: no folders of anybody's machine.
+/// File names for a provenance: without the folders of this machine.
 pub(crate) fn file_name(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }

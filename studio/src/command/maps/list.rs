@@ -1,4 +1,4 @@
-//! `rubor maps list` and `rubor maps extract`: what maps a head has.
+//! `rubor maps list` and `rubor maps extract`: the maps of a head.
 
 use std::path::PathBuf;
 
@@ -89,7 +89,7 @@ pub(super) fn run(a: &ListArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
     Ok(json!({ "maps": maps, "on_the_graphics_card": on_card(&head) }))
 }
 
-/// Bytes of the textures that a head becomes, raw and as blocks.
+/// Bytes of the textures of a head, raw and in block formats.
 pub(crate) fn on_card(head: &Head) -> Vec<Value> {
     let row = |f: Footprint| {
         json!({

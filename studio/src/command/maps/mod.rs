@@ -1,9 +1,9 @@
-//! `rubor maps`: measured and painted maps into what a head needs, as files or into a head file.
+//! `rubor maps`: converts measured and painted maps to the maps of a head, as files or into a head file.
 //!
 //! ```text
 //! images --hemoglobin, chromophores, normals, transfer, predict--> folder of maps
 //!                                                   --into HEAD--> another head with these maps
-//! head   --list, extract--> what its maps are, their images
+//! head   --list, extract--> sizes and origins of its maps, their images
 //! ```
 
 use std::path::Path;
@@ -53,7 +53,7 @@ pub(crate) enum MapsCommand {
     Transfer(transfer::TransferArgs),
     /// Distributions and wrinkle weights of a head from the strain of its expressions
     Predict(predict::PredictArgs),
-    /// How far scale and bias are from exact local histogram matching
+    /// The error of scale and bias against exact local histogram matching
     Compare(compare::CompareArgs),
     /// The maps of a head: sizes, ranges, origin, memory on the graphics card
     List(list::ListArgs),

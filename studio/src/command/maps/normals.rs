@@ -16,7 +16,7 @@ use rubor::inputs::LoadedHead;
 use rubor::notes::Note;
 use rubor::{Failure, Outcome, output};
 
-/// What `rubor maps normals` makes.
+/// Results of `rubor maps normals`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum NormalsTarget {
     /// Partial derivative slopes of a normal map; with --into the relief of the head
@@ -34,7 +34,7 @@ pub(crate) enum NormalsTarget {
 pub(crate) struct NormalsArgs {
     /// Normal map, or slopes as floats
     input: PathBuf,
-    /// What to make
+    /// Result to make
     #[arg(long, value_enum)]
     to: NormalsTarget,
     /// Base normal map of a difference, or of wrinkles whose normal map holds the base as well

@@ -28,7 +28,7 @@ const LEAST_WRINKLE: f32 = 0.05;
 /// Arguments of `rubor maps predict`.
 #[derive(Debug, Args)]
 pub(crate) struct PredictArgs {
-    /// Head whose geometry is predicted from (.glb, .gltf); reports how far its own maps agree
+    /// Head whose geometry is predicted from (.glb, .gltf); reports the agreement with its own maps
     head: PathBuf,
     /// Rig whose expressions are predicted [default: the head's, else the default one]
     #[arg(long)]
@@ -144,7 +144,7 @@ fn expressions(head: &Head, rig: &Rig, model: &StrainModel, mean: &Map) -> Outco
     Ok(names.into_iter().enumerate().map(one).collect())
 }
 
-/// Correlation of predictions with what the head has, expression by expression and zone by zone.
+/// Correlation of predictions with the head's own data, expression by expression and zone by zone.
 fn agreement(head: &Head, expressions: &[Expression], mean: &Map) -> Value {
     let skin = SkinTexels::new(head, mean.width, mean.height).mask();
     let ratio = |bias: &Map| on_skin(bias, mean, &skin, |b, m| b / m.max(1e-6));

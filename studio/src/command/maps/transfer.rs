@@ -31,13 +31,13 @@ pub(crate) struct TransferArgs {
     #[arg(long)]
     correspondences: Option<PathBuf>,
     /// Both have one texture layout [default: for files, and for heads with equal texture coordinates; other heads
-    /// meet through the landmarks that both have]
+    /// are matched by the landmarks that both have]
     #[arg(long, conflicts_with = "correspondences")]
     same_layout: bool,
     /// Only these distributions; repeat for more [default: all]
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
-    /// How the bias crosses to another level of blood
+    /// How the bias is adapted to another level of blood
     #[arg(long, value_enum, default_value = "ratio")]
     bias: BiasArg,
     #[command(flatten)]
@@ -57,7 +57,7 @@ enum BiasArg {
     Absolute,
 }
 
-/// Who gives: distributions, the mean they stand on, and the head where there is one.
+/// The giver: distributions, their neutral mean, and the head if there is one.
 struct Giver {
     distributions: Vec<Distribution>,
     mean: Map,
@@ -160,7 +160,7 @@ fn from_folder(folder: &Path, notes: &mut Vec<Note>) -> Outcome<Giver> {
     Ok(Giver { distributions, mean, head: None })
 }
 
-/// The mean that the distributions of a head stand on, or that of its blood.
+/// The neutral mean of a head's distributions, or that of its blood.
 pub(super) fn mean_of(head: &Head) -> Outcome<Map> {
     if let Some(mean) = &head.maps.hemoglobin_mean {
         return Ok(mean.clone());
@@ -172,7 +172,7 @@ pub(super) fn mean_of(head: &Head) -> Outcome<Map> {
     Ok(into_head::neutral_mean(head, blood)?)
 }
 
-/// The way from the receiver's texture to the giver's, and its name.
+/// The mapping from the receiver's texture to the giver's, and its name.
 fn warp(
     a: &TransferArgs,
     giver: Option<&Head>,

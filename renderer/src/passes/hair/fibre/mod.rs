@@ -61,7 +61,7 @@ pub(crate) struct HairLight {
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
 
-/// Bindings and constants that the light of a scene needs.
+/// Samplers and the stand-in texture with which hair shaders read the light of a scene.
 pub(crate) struct Fibre {
     compare: wgpu::Sampler,
     trilinear_repeat: wgpu::Sampler,
