@@ -96,6 +96,8 @@ impl Gltf {
     }
 }
 
+type Change = fn(&mut Value);
+
 const BOTH: [&str; 2] = ["jawOpen", "mouthSmileLeft"];
 
 /// Adds a second mesh with one shape and its node.
@@ -173,6 +175,24 @@ fn gltf_files() {
         "fewer names than targets",
         |d, _, _| d["meshes"][0]["extras"]["targetNames"] = json!(["jawOpen"]),
         |i| assert_eq!(names(&i.head), ["jawOpen", "target 1"]),
+    );
+    t.row(
+        "more names than targets",
+        |d, _, _| d["meshes"][0]["extras"]["targetNames"] = json!(["jawOpen", "mouthSmileLeft", "third"]),
+        |i| assert_eq!(names(&i.head), BOTH),
+    );
+    t.row(
+        "one mesh on two nodes with other default weights",
+        |d, _, _| {
+            d["nodes"] = json!([{"mesh": 0, "weights": [1, 0]}, {"mesh": 0, "weights": [0.5, 0], "translation": [1, 0, 0]}]);
+            d["scenes"][0]["nodes"] = json!([0, 1]);
+        },
+        |i| assert_eq!(ends(i), [("jawOpen", 1.0), ("jawOpen_1", 0.5)]),
+    );
+    t.row(
+        "an extension that is used, not required, and not known",
+        |d, _, _| d["extensionsUsed"] = json!(["EXT_mesh_gpu_instancing"]),
+        |i| assert_eq!(names(&i.head), BOTH),
     );
     t.row(
         "one name twice in a mesh",
@@ -278,7 +298,7 @@ fn gltf_files() {
             assert_eq!(ends(i), [("jawOpen", 1.5), ("mouthSmileLeft", -0.5)]);
         },
     );
-    let channel = |change: fn(&mut Value)| {
+    let channel = |change: Change| {
         move |d: &mut Value, p: &mut Pieces, _: &FaceAccessors| {
             animate(d, p, &[0.0, 1.0], &[0.0, 0.0, 1.0, 0.5]);
             let animation = &mut d["animations"][0];
@@ -292,7 +312,7 @@ fn gltf_files() {
             );
         }
     };
-    let channels: [(&str, fn(&mut Value)); 8] = [
+    let channels: [(&str, Change); 8] = [
         ("a channel without a node", |c| c["target"] = json!({"path": "translation"})),
         ("an animation pointer", |c| {
             c["target"] = json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": "/materials/0"}}});
@@ -447,8 +467,11 @@ fn gltf_files() {
         d["extensionsRequired"] = json!(["ACME_blobs"])
     });
     t.refused("a ring of nodes", |d, _, _| d["nodes"][0]["children"] = json!([0]));
-    t.refused("indices of vertices that do not exist", |d, _, a| {
-        d["meshes"][0]["primitives"][0]["indices"] = json!(a.jaw)
+    t.refused("indices of vertices that do not exist", |d, p, _| {
+        let view = p.view(&[0, 0, 0, 1, 0, 0, 0, 9, 0, 0, 0, 0], None);
+        let far =
+            p.accessor(json!({"bufferView": view, "componentType": 5125, "count": 3, "type": "SCALAR"}));
+        d["meshes"][0]["primitives"][0]["indices"] = json!(far);
     });
     t.refused("an accessor that does not exist", |d, _, _| {
         d["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(99);
@@ -579,6 +602,21 @@ fn obj_files() {
     one(text.as_bytes(), &|s| assert_eq!(parts(s), two), "groups without materials", &mut t);
     let text = square(&format!("o face\n{FACE}o teeth\n{FACE}"));
     one(text.as_bytes(), &|s| assert_eq!(parts(s), two), "objects without materials", &mut t);
+    let text = square(&format!("o teeth\n{FACE}o head\nusemtl skin\n{FACE}"));
+    let mixed = [("teeth", Material::Teeth), ("skin", Material::Skin)];
+    one(
+        text.as_bytes(),
+        &|s| assert_eq!(parts(s), mixed),
+        "an object without material beside one with",
+        &mut t,
+    );
+    let text = square(&format!("usemtl initialShadingGroup\ng face\n{FACE}g teeth\n{FACE}"));
+    one(
+        text.as_bytes(),
+        &|s| assert_eq!(parts(s), two),
+        "groups that all have a program's default material",
+        &mut t,
+    );
     one(square(FACE).as_bytes(), &same_square, "no groups and no materials", &mut t);
     let text = format!(
         "o a\nv 0 0 5\nv 1 0 5\nv 1 1 5\nf 1 2 3\no b\n{}",

@@ -33,7 +33,7 @@ use crate::poly::{Corner, PolyMesh};
 pub enum GroupBy {
     /// `g` and `o`, whichever stands last before a face.
     Group,
-    /// `usemtl`; `g` and `o` in files without any.
+    /// `usemtl`; `g` and `o` for faces without a material, or with the default one of a program.
     Material,
 }
 
@@ -124,9 +124,9 @@ fn logical_lines(text: &[u8]) -> Vec<(usize, Cow<'_, [u8]>)> {
             if !has_numbers(keyword(&line)) && is_keyword(keyword(next)) {
                 break;
             }
-            let mut joined = begun.to_vec();
+            let mut joined = begun.trim_ascii_end().to_vec();
             joined.push(b' ');
-            joined.extend_from_slice(without_comment(next));
+            joined.extend_from_slice(without_comment(next).trim_ascii_start());
             line = Cow::Owned(joined);
             i += 1;
         }
@@ -147,6 +147,23 @@ fn without_comment(line: &[u8]) -> &[u8] {
     let numbers = has_numbers(keyword(line));
     let end = (0..line.len()).find(|i| starts(*i) || numbers && line[*i] == b'#');
     &line[..end.unwrap_or(line.len())]
+}
+
+/// Names that programs give to the material of whatever has none: they say nothing about a part.
+fn is_default_material(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    let bare = name.trim_end_matches(|c: char| c.is_ascii_digit() || matches!(c, '.' | '_'));
+    matches!(
+        name.as_str(),
+        "default"
+            | "none"
+            | "(null)"
+            | "null"
+            | "initialshadinggroup"
+            | "lambert1"
+            | "lambert1sg"
+            | "defaultmat"
+    ) || matches!(bare, "material" | "defaultmaterial" | "default_material")
 }
 
 /// A `v`, `vt` or `f` line that was given to `tobj`.
@@ -362,6 +379,7 @@ impl<'a> Reader<'a> {
             self.notes.add(message, format!("{} of {}", self.faces_without_uv, self.given_faces.len()));
         }
         let mut default = None;
+        let mut by_group = 0;
         let mut used: HashMap<u32, u32> = HashMap::new();
         let mut corner = 0;
         for f in 0..self.given_faces.len() {
@@ -374,7 +392,16 @@ impl<'a> Reader<'a> {
                 corner += 1;
             }
             mesh.face_starts.push(mesh.corners.len() as u32);
-            let name = if by_material { self.material_of[f] } else { self.group_of[f] };
+            let (material, group) = (self.material_of[f], self.group_of[f]);
+            let said = material.filter(|m| !is_default_material(&self.groups[*m as usize]));
+            let name = match (by_material, group) {
+                (true, Some(group)) if said.is_none() => {
+                    by_group += 1;
+                    Some(group)
+                }
+                (true, _) => material,
+                (false, _) => group,
+            };
             let name = name.unwrap_or_else(|| *default.get_or_insert_with(|| self.name(b"default")));
             let groups = &mut mesh.groups;
             let group = *used.entry(name).or_insert_with(|| {
@@ -382,6 +409,13 @@ impl<'a> Reader<'a> {
                 groups.len() as u32 - 1
             });
             mesh.face_groups.push(group);
+        }
+        if by_group > 0 {
+            let place = format!("{by_group} of {}", self.given_faces.len());
+            self.notes.add(
+                "faces without a material, or with a program's default, are parts by their groups",
+                place,
+            );
         }
         Ok(ObjFile { mesh, notes: self.notes.into_vec() })
     }

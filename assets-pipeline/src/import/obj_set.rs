@@ -201,7 +201,7 @@ pub fn read(options: &Options) -> Result<ImportedSet, ImportError> {
         }
         // Groups and texture coordinates are those of the neutral file.
         let about_points =
-            |n: &&Note| !n.message.contains("texture coordinates") && !n.message.contains("parts are");
+            |n: &&Note| !["texture coordinates", "parts"].iter().any(|w| n.message.contains(w));
         let of_file: Vec<Note> = of_file.iter().filter(about_points).cloned().collect();
         said(&mut notes, path, &of_file);
         shapes.push(shape);

@@ -63,9 +63,12 @@ impl Document {
             ImportError::content(path, "document", e.to_string(), "a valid glTF 2.0 document")
         };
         let raw: Value = serde_json::from_slice(&text).map_err(invalid)?;
-        let mut json = serde_json::from_value(readable(&raw, notes)).map_err(invalid)?;
+        let mut json: gltf_json::Root = serde_json::from_value(readable(&raw, notes)).map_err(invalid)?;
         check_extensions(&json, path)?;
         json.extensions_required.clear();
+        for name in json.extensions_used.iter().filter(|n| !is_understood(n)) {
+            notes.add("extensions that the file uses are not read", name);
+        }
         check_positions(&json, path)?;
         check_indices(&json, path, notes)?;
         let gltf = gltf::Document::from_json_without_validation(json);
@@ -183,7 +186,7 @@ impl Document {
     }
 }
 
-/// JSON and binary chunk.
+/// JSON, and the binary chunk if there is one.
 type Chunks<'a> = (Cow<'a, [u8]>, Option<Vec<u8>>);
 
 /// The JSON and the binary chunk of a GLB; a file without its header is JSON alone.
@@ -254,12 +257,14 @@ fn is_attribute(name: &str) -> bool {
         || ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"].into_iter().any(numbered)
 }
 
-/// Extensions that a file requires must be supported; compressed geometry has its own message.
+fn is_understood(extension: &str) -> bool {
+    UNDERSTOOD.contains(&extension) || UNDERSTOOD_FAMILIES.iter().any(|family| extension.starts_with(family))
+}
+
+/// What a file requires must be understood; compressed geometry is refused in words.
 fn check_extensions(json: &gltf_json::Root, path: &Path) -> Result<(), ImportError> {
     for (i, name) in json.extensions_required.iter().enumerate() {
-        let known = UNDERSTOOD.contains(&name.as_str())
-            || UNDERSTOOD_FAMILIES.iter().any(|family| name.starts_with(family));
-        if known {
+        if is_understood(name) {
             continue;
         }
         let expected = match name.as_str() {

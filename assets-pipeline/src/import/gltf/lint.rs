@@ -42,7 +42,15 @@ pub fn lint(bytes: &[u8], path: &Path) -> Result<Vec<Finding>, ImportError> {
         let message = "joints are read in their rest pose: their animation moves nothing here";
         findings.push(Finding::note("skins", message).fix("bake jaw and eye joints into morph targets"));
     }
-    findings.extend(notes.into_vec().iter().map(Finding::from));
+    let mut notes = notes.into_vec();
+    if document.gltf.extension_value(NAME).is_none()
+        && let Ok(imported) = super::from_bytes(bytes, path)
+    {
+        let new = |n: &crate::notes::Note| notes.iter().all(|known| known.message != n.message);
+        let more: Vec<_> = imported.notes.into_iter().filter(new).collect();
+        notes.extend(more);
+    }
+    findings.extend(notes.iter().map(Finding::from));
     Ok(findings)
 }
 

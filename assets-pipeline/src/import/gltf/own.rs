@@ -86,8 +86,8 @@ fn geometry(
         return Err(document.fail(NAME, found, format!("one for each of the {count} primitives")));
     }
     let point_count = extension.point_count as usize;
-    let vertex_count: usize =
-        source.primitives().filter_map(|p| p.get(&Semantic::Positions)).map(|a| a.count()).sum();
+    let counts = source.primitives().filter_map(|p| p.get(&Semantic::Positions)).map(|a| a.count());
+    let vertex_count = counts.fold(0, usize::saturating_add);
     if point_count > vertex_count {
         return Err(document.fail(
             NAME,

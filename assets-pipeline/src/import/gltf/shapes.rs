@@ -61,6 +61,12 @@ impl Shapes {
             if let Some(message) = from {
                 notes.add(message, label(&mesh));
             }
+            let listed =
+                document.raw["meshes"][mesh.index()]["extras"]["targetNames"].as_array().map_or(0, Vec::len);
+            if listed > names.len() {
+                let place = format!("{listed} names for {} targets of {}", names.len(), label(&mesh));
+                notes.add("names of targets that do not exist are left out", place);
+            }
             let unnamed = names.iter().filter(|n| !n.given).count();
             if unnamed > 0 {
                 let message = "morph targets have no name and are numbered: nothing can drive them by name";
