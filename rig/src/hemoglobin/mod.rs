@@ -11,8 +11,7 @@
 //! Rules for cases that the equations leave open:
 //! - `sigma_n = 0`: `scale = (sigma_i + d) / (sigma_n + d)` with `d = 1e-8 mu_n`, at most [`MAX_SCALE`]. Where
 //!   `sigma_n` is 1e-4 of the mean this changes the scale by 1e-4 of itself; where both deviations are 0 it is 1.
-//! - The neutral distribution has the weight that the others leave, and `H` is computed as `H_n` plus differences to
-//! neutral:
+//! - The neutral distribution has the weight that the others leave, and `H` is computed as `H_n` plus differences to it:
 //!   algebraically equation 7.6, and neutral weights give `H_n` bit for bit.
 //! - `H` is clamped to 0..[`crate::skin::chromophores::MAX_HEMOGLOBIN`].
 

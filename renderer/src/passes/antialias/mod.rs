@@ -45,7 +45,7 @@
 //! # Inputs and outputs
 //! - Colours: any texture that loads as `f32`, one for each of [`Mode::subsamples`], encoded as
 //!   [`Settings::encoding`] says (sRGB by default), with alpha as [`Settings::alpha`] says (straight by default). NaN
-//! must not occur.
+//!   must not occur.
 //! - Depth, where [`Settings::needs_depth`]: one for each sample, any monotonic scale.
 //! - Velocity for T2x and 4x: motion since the previous frame in pixels, x right, y down, without jitter; `rg`.
 //! - Output: a storage texture of the format given to [`Antialias::new`], encoded like the input.

@@ -1,5 +1,4 @@
 use super::*;
-use crate::settings::Settings;
 use crate::testing::{gpu, half_image, read_image, recorded};
 
 /// Hable's curve over its value at white, or nothing; then IEC 61966-2-1.
@@ -19,7 +18,7 @@ fn radiance_is_shown_as_the_curves_say_and_brighter_is_never_darker() {
     let ramp: Vec<[f32; 4]> = (0..51 * 27).map(|i| [1e-4 * 1.01f32.powi(i), 0.3, 0.0, 1.0]).collect();
     let hdr = half_image(gpu, [51, 27], &ramp);
     for tone_map in ToneMap::all() {
-        let look = Look { exposure: 1.3, tone_map, ..Settings::default().look };
+        let look = Look { exposure: 1.3, tone_map };
         let display = Display::new(gpu, tone_map);
         let image = recorded(gpu, |r| display.record(r, &look, &hdr));
         let found = read_image::<[u8; 4]>(gpu, &image);
