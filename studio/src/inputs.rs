@@ -29,6 +29,8 @@ pub struct LoadedHead {
     pub animation: Option<Sequence>,
     /// Where it comes from, and what the file held.
     pub source: InputFile,
+    /// What was left out, guessed or repaired as it was read.
+    pub notes: Vec<Note>,
 }
 
 /// The head of a file (`.glb`, `.gltf`), or the built-in one.
@@ -64,6 +66,11 @@ pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
         rig,
         sequence,
         animation: imported.animation,
+        notes: imported
+            .notes
+            .iter()
+            .map(|note| Note::new(name.display().to_string(), note.to_string()))
+            .collect(),
         source: InputFile { file: path.map(absolute).transpose()?, fingerprint: Fingerprint::of(&bytes) },
     })
 }
@@ -144,7 +151,7 @@ pub fn character(
     let skin = synthesize::Options { resolution: CHARACTER_MAPS, ..character.skin() };
     synthesize::synthesize_into_with(&mut head, &skin, step).map_err(Failure::input)?;
     let source = InputFile { file: None, fingerprint: Fingerprint::of(character.name.as_bytes()) };
-    Ok(LoadedHead { head, rig: None, sequence: None, animation: None, source })
+    Ok(LoadedHead { head, rig: None, sequence: None, animation: None, source, notes: Vec::new() })
 }
 
 /// Side of the maps of a character, texels.
