@@ -75,19 +75,21 @@ fn models() -> Outcome<[(Model, Head); 4]> {
 /// A head whose skin is of tiles: half of them metal, with bumps, dark joints, and holes where alpha is none.
 fn tiled(mut head: Head) -> Head {
     const SIDE: u32 = 16;
+    fn is_metal(x: u32, y: u32) -> bool {
+        (x / 8 + y / 8).is_multiple_of(2)
+    }
     let image = |name: &str, texel: fn(u32, u32) -> [u8; 4]| AuthoredImage {
         name: name.into(),
         width: SIDE,
         height: SIDE,
         rgba: (0..SIDE * SIDE).flat_map(|i| texel(i % SIDE, i / SIDE)).collect(),
     };
-    let is_metal = |x: u32, y: u32| (x / 8 + y / 8) % 2 == 0;
-    let color = image("colours", move |x, y| match (x % 8, y % 8) {
+    let color = image("colours", |x, y| match (x % 8, y % 8) {
         (3 | 4, 3 | 4) if y < 8 => [255, 255, 255, 0],
         _ if is_metal(x, y) => [255, 196, 110, 255],
         _ => [40, 90, 170, 255],
     });
-    let surface = image("roughness and metal", move |x, y| {
+    let surface = image("roughness and metal", |x, y| {
         let metal = if is_metal(x, y) { 255 } else { 0 };
         [0, if x < 8 { 90 } else { 180 }, metal, 255]
     });
