@@ -59,6 +59,9 @@ pub struct PartEntry {
     pub name: String,
     /// How it is shaded.
     pub material: Material,
+    /// It is drawn in the glTF material of its primitive.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub authored: bool,
     /// Accessor: point of each vertex of the primitive, SCALAR, unsigned short or int.
     pub points: u32,
 }

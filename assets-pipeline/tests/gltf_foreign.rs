@@ -401,7 +401,7 @@ fn the_published_schema_names_the_properties() {
         "hairColorLinear": [0.1, 0.1, 0.1], "slopes": map, "specular": map, "scattering": map,
         "wrinkleSlopes": [map], "zones": [zone], "distributions": [distribution],
     });
-    let part = json!({"name": "p", "material": "skin", "points": 1});
+    let part = json!({"name": "p", "material": "other", "authored": true, "points": 1});
     let provenance = json!({"of": "geometry", "kind": "measured", "source": "s", "licence": "MIT"});
     let whole = json!({
         "version": 1, "name": "n", "mesh": 0, "pointCount": 3, "parts": [part], "occlusion": 2,

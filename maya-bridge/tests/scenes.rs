@@ -122,6 +122,7 @@ fn head() -> Head {
             source: "noise".into(),
             licence: "CC0-1.0".into(),
         }],
+        ..Head::default()
     }
 }
 

@@ -13,6 +13,7 @@ use crate::device::native;
 use crate::passes::geometry::{morph, shadow, tangent_frames, velocity, visibility};
 use crate::passes::hair::overlay;
 use crate::passes::{appearance, compose, display, resolve, shade};
+use crate::scene::authored::{GpuAuthoredVertex, GpuMaterial, GpuTexture};
 use crate::scene::head::GpuVertex;
 use crate::scene::lamp::GpuLight;
 use crate::scene::view::View;
@@ -34,6 +35,7 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     assert_workgroups(&appearance::program(), &square("appearance"));
     assert_workgroups(&shade::program(), &square("shade"));
     assert_workgroups(&shade::samples_program(), &line("light_samples"));
+    assert_workgroups(&shade::authored_program(), &square("shade_authored"));
     assert_workgroups(&compose::program(), &square("compose"));
     for tone_map in ToneMap::all() {
         assert_workgroups(&display::program(tone_map), &square("display"));
@@ -44,6 +46,9 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
         assert_raster(&visibility::program(numbered), &visibility::entries(numbered));
     }
     assert_raster(&shadow::program(), &["shadow_vertex"]);
+    for program in [visibility::cut_program(), shadow::cut_program()] {
+        assert_raster(&program, &["cut_vertex", "cut_fragment"]);
+    }
     assert_raster(&overlay::program(), &["overlay_vertex", "overlay_fragment"]);
 }
 
@@ -67,6 +72,28 @@ fn structs_are_laid_out_alike_on_both_sides() {
         "Vertex",
         size_of::<GpuVertex>(),
         &offsets!(GpuVertex; point as "point", u as "u", v as "v"),
+    );
+    assert_layout(
+        &shade::authored_program(),
+        "shade_authored",
+        "AuthoredTexture",
+        size_of::<GpuTexture>(),
+        &offsets!(GpuTexture; to_u as "to_u", to_v as "to_v", place as "place"),
+    );
+    assert_layout(
+        &shade::authored_program(),
+        "shade_authored",
+        "AuthoredMaterial",
+        size_of::<GpuMaterial>(),
+        &offsets!(GpuMaterial; base_color as "base_color", emission as "emission", factors as "factors",
+            flags as "flags", textures as "textures"),
+    );
+    assert_layout(
+        &shade::authored_program(),
+        "shade_authored",
+        "AuthoredVertex",
+        size_of::<GpuAuthoredVertex>(),
+        &offsets!(GpuAuthoredVertex; u as "u", v as "v", red_green as "red_green", blue_alpha as "blue_alpha"),
     );
     assert_layout(
         &morph::program(),

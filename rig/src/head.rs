@@ -9,6 +9,7 @@ use std::ops::Range;
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::authored::Authored;
 use crate::error::HeadError;
 use crate::map::Map;
 
@@ -26,6 +27,8 @@ pub struct Head {
     pub shapes: Vec<BlendShape>,
     /// Chromophore, normal, specular and wrinkle maps. A head without measured maps may have none.
     pub maps: SkinMaps,
+    /// Materials that the author gave to parts that rubor has none of its own for.
+    pub authored: Authored,
     /// Anatomical points of the rest surface by name (see [`crate::landmarks`]), metres.
     pub landmarks: BTreeMap<String, Vec3>,
     /// Sources of geometry and maps.
@@ -97,7 +100,7 @@ pub enum Material {
     Wet,
     /// Helper shells that darken or blend the eye in other renderers; never drawn here.
     Hidden,
-    /// Anything else: drawn in diffuse grey.
+    /// Anything else: drawn in the material of its author ([`Head::authored`]), diffuse grey where it has none.
     Other,
 }
 
@@ -330,7 +333,10 @@ impl Head {
                 return fail(at(), format!("{c:?}"), "changes from -1 to 1 at an existing point");
             }
         }
-        self.maps.validate().or_else(|(at, found, expected)| fail(at, found, expected))
+        let authored = self.authored.validate(mesh.parts.len(), mesh.vertices.len());
+        authored
+            .and_then(|()| self.maps.validate())
+            .or_else(|(at, found, expected)| fail(at, found, expected))
     }
 }
 

@@ -63,8 +63,9 @@ fn parts(head: &Head, findings: &mut Vec<Finding>) {
                 .fix("name the material of the face with a word such as skin, face or head"),
         );
     }
+    let other = head.mesh.parts.iter().enumerate().filter(|(_, p)| p.material == Material::Other);
     let other: Vec<&str> =
-        (head.mesh.parts.iter()).filter(|p| p.material == Material::Other).map(|p| p.name.as_str()).collect();
+        other.filter(|(i, _)| head.authored_material(*i).is_none()).map(|(_, p)| p.name.as_str()).collect();
     if !other.is_empty() {
         let message = format!("the material of {} is not known: drawn diffuse grey", list(&other));
         findings.push(

@@ -3,7 +3,20 @@
 use rubor_rig::head::Material;
 
 /// Words in names (lower case) and what they mean; the first that occurs wins, so special ones stand first.
-const WORDS: [(&str, Material); 34] = [
+const WORDS: [(&str, Material); 46] = [
+    ("glasses", Material::Other),
+    ("eyewear", Material::Other),
+    ("headwear", Material::Other),
+    ("facewear", Material::Other),
+    ("headband", Material::Other),
+    ("headphone", Material::Other),
+    ("earring", Material::Other),
+    ("necklace", Material::Other),
+    ("outfit", Material::Other),
+    ("shirt", Material::Other),
+    ("cloth", Material::Other),
+    ("helmet", Material::Other),
+    ("hairband", Material::Other),
     ("eyeocclusion", Material::Hidden),
     ("eye_occlusion", Material::Hidden),
     ("occlusion", Material::Hidden),
@@ -36,14 +49,18 @@ const WORDS: [(&str, Material); 34] = [
     ("neck", Material::Skin),
     ("ears", Material::Skin),
     ("lip", Material::Skin),
-    ("cloth", Material::Other),
     ("eye", Material::Eye),
 ];
 
 /// The material that a name speaks of; skin where it speaks of nothing known (a mesh without names is mostly a scan).
 pub fn guess_material(name: &str) -> Material {
+    recognise(name).unwrap_or(Material::Skin)
+}
+
+/// The material that a name speaks of, if it speaks of one.
+pub fn recognise(name: &str) -> Option<Material> {
     let name = name.to_lowercase();
-    WORDS.iter().find(|(word, _)| name.contains(word)).map_or(Material::Skin, |(_, m)| *m)
+    WORDS.iter().find(|(word, _)| name.contains(word)).map(|(_, m)| *m)
 }
 
 #[cfg(test)]
@@ -64,9 +81,11 @@ mod tests {
             ("M_EyeOcclusion", Material::Hidden),
             ("M_EyeLashes", Material::Lash),
             ("eyeball_L", Material::Eye),
+            ("Wolf3D_Glasses", Material::Other),
             ("Material.001", Material::Skin),
         ] {
             assert_eq!(guess_material(name), material, "{name}");
         }
+        assert_eq!(recognise("Material.001"), None);
     }
 }

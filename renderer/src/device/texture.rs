@@ -2,6 +2,7 @@
 
 use half::f16;
 use rayon::prelude::*;
+use rubor_rig::color::srgb_encode;
 
 use crate::device::Gpu;
 
@@ -62,6 +63,23 @@ pub(crate) fn upload_bytes<const N: usize>(
     use wgpu::TextureFormat::{R8Unorm, Rg8Unorm, Rgba8Unorm};
     let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
     upload_channels::<N, u8>(gpu, label, size, layers, [R8Unorm, Rg8Unorm, Rgba8Unorm], byte)
+}
+
+/// A texture array of sRGB colours with alpha from linear ones; `layers[layer][level][texel]`.
+pub(crate) fn upload_srgb(
+    gpu: &Gpu,
+    label: &str,
+    size: [u32; 2],
+    layers: &[Vec<Vec<Texel>>],
+) -> wgpu::TextureView {
+    let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+    upload(gpu, label, size, layers, wgpu::TextureFormat::Rgba8UnormSrgb, &|texels| {
+        let encode = |t: &Texel| {
+            let [r, g, b] = [t[0], t[1], t[2]].map(|c| byte(srgb_encode(c)));
+            [r, g, b, byte(t[3])]
+        };
+        texels.par_iter().with_min_len(4096).flat_map_iter(encode).collect::<Vec<u8>>()
+    })
 }
 
 /// The first N channels of texels; `formats` are those of 1, 2 and 4.

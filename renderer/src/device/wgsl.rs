@@ -32,7 +32,8 @@ macro_rules! module {
 pub(crate) use module;
 
 /// Modules that every shader may import.
-const SHARED: [Module; 5] = [
+const SHARED: [Module; 6] = [
+    module!("authored", "../shared/authored.wesl"),
     module!("blocks", "../shared/blocks.wesl"),
     module!("math", "../shared/math.wesl"),
     module!("light", "../shared/light.wesl"),

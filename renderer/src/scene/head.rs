@@ -7,11 +7,13 @@ use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, resize_area};
 use wgpu::util::DeviceExt;
 
+use super::authored::AuthoredOnGpu;
 use super::clusters::{Cluster, clusters};
 use super::footprint::{APPEARANCE_SIZE, largest_of, mask_size};
 use super::hair_roots::roots;
-use crate::device::Gpu;
+use crate::device::kernel::Resource;
 use crate::device::texture::{self, Texel};
+use crate::device::{Bind, Gpu};
 use crate::error::RenderError;
 
 /// Largest melanin fraction of the skin colour table (papers/004 table 7.1).
@@ -26,6 +28,8 @@ pub(crate) const MAX_SHAPES: usize = 1 << 12;
 pub const MAX_DISTRIBUTIONS: usize = 64;
 /// Wrinkle zones that one head can have.
 pub const MAX_ZONES: usize = 64;
+/// Bits of rubor's own material in the number of a triangle's material; above them stands that of the author.
+pub(crate) const AUTHORED_SHIFT: u32 = 8;
 
 /// Skin colour as a function of chromophores: columns are the cube root of melanin / 0.5, rows the cube root of
 /// hemoglobin / 0.32 (papers/004 eq. 7.7); the first and last texel stand at 0 and 1.
@@ -55,6 +59,8 @@ pub struct HeadOnGpu {
     /// Points at the corners of the opaque triangles: an index buffer.
     pub(crate) opaque_points: wgpu::Buffer,
     pub(crate) opaque_triangles: u32,
+    /// How many of these, the last ones, have holes where alpha says so.
+    pub(crate) cut_triangles: u32,
     pub(crate) overlay_triangles: u32,
     pub(crate) shape_count: usize,
     pub(crate) rest: wgpu::Buffer,
@@ -67,6 +73,7 @@ pub struct HeadOnGpu {
     pub(crate) hair_roots: wgpu::Buffer,
     pub(crate) hair_root_count: u32,
     pub(crate) maps: Option<MapsOnGpu>,
+    pub(crate) authored: Option<AuthoredOnGpu>,
     pub(crate) skin_color: wgpu::TextureView,
     pub(crate) bounds: (Vec3, Vec3),
     /// Millimetres of skin across the unit square of the texture: the median over its triangles.
@@ -111,6 +118,7 @@ impl HeadOnGpu {
             return Err(RenderError::Limit { what: "number of points", found, expected });
         };
         limit("number of triangles", mesh.triangles.len(), (1 << 27) - 2)?;
+        limit("number of authored materials", head.authored.materials.len(), (1 << 24) - 2)?;
         limit("number of blend shapes", head.shapes.len(), MAX_SHAPES)?;
         limit("number of wrinkle maps", head.maps.wrinkle_slopes.len(), MAX_WRINKLE_MAPS)?;
         limit("number of hemoglobin distributions", head.maps.distributions.len(), MAX_DISTRIBUTIONS)?;
@@ -125,7 +133,7 @@ impl HeadOnGpu {
             .iter()
             .map(|v| GpuVertex { point: v.point, u: v.uv.x, v: v.uv.y, padding: 0 })
             .collect();
-        let (triangles, opaque, overlay) = ordered_triangles(head);
+        let (triangles, [opaque, cut, overlay]) = ordered_triangles(head);
         let corners = triangles[..opaque as usize].iter().flat_map(|t| &t[..3]);
         let opaque_points: Vec<u32> = corners.map(|v| mesh.vertices[*v as usize].point).collect();
         let (ring_starts, ring) = rings(head, &triangles);
@@ -140,6 +148,7 @@ impl HeadOnGpu {
             vertex_count: mesh.vertices.len() as u32,
             opaque_points: index_buffer(gpu, &opaque_points),
             opaque_triangles: opaque,
+            cut_triangles: cut,
             overlay_triangles: overlay,
             shape_count: head.shapes.len(),
             rest: gpu.storage("rest points", &rest),
@@ -152,6 +161,7 @@ impl HeadOnGpu {
             hair_roots: gpu.storage("hair roots", &hair_roots),
             hair_root_count: hair_roots.len() as u32,
             maps,
+            authored: AuthoredOnGpu::new(gpu, head)?,
             skin_color,
             bounds,
             mm_per_texture: mm_per_texture(head),
@@ -167,6 +177,15 @@ impl HeadOnGpu {
         (self.opaque_triangles, self.overlay_triangles)
     }
 
+    /// What tells where triangles have holes; `None` where none has.
+    pub(crate) fn cut_resources(&self) -> Option<Vec<Resource<'_>>> {
+        let authored = self.authored.as_ref().filter(|_| self.cut_triangles > 0)?;
+        let mut resources =
+            vec![("cut_vertices", self.vertices.bound()), ("cut_triangles", self.triangles.bound())];
+        resources.extend(authored.resources());
+        Some(resources)
+    }
+
     fn count_bytes(&self) -> u64 {
         let buffers = [
             &self.rest,
@@ -179,7 +198,8 @@ impl HeadOnGpu {
             &self.hair_roots,
             &self.opaque_points,
         ];
-        buffers.iter().map(|b| b.size()).sum::<u64>() + self.map_bytes()
+        let authored = self.authored.iter().flat_map(|a| [&a.materials, &a.vertices]);
+        buffers.into_iter().chain(authored).map(|b| b.size()).sum::<u64>() + self.map_bytes()
     }
 
     /// Bytes of the textures of its maps.
@@ -188,7 +208,8 @@ impl HeadOnGpu {
             [&m.skin, &m.gloss, &m.slopes, &m.wrinkles, &m.distributions, &m.neutral_mean, &m.masks]
                 .map(texture_bytes)
         });
-        textures.sum()
+        let authored = self.authored.iter().flat_map(|a| [&a.colors, &a.data].map(texture_bytes));
+        textures.chain(authored).sum()
     }
 }
 
@@ -261,26 +282,32 @@ fn merged_changes(shape: &BlendShape) -> Vec<(u32, Vec3, u32)> {
     }
 }
 
-/// Triangles with the number of their material: opaque ones first, then overlays; hidden ones are left out.
-fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, u32, u32) {
-    let of = |wanted: &dyn Fn(Material) -> bool| -> Vec<[u32; 4]> {
-        head.mesh
-            .parts
-            .iter()
-            .filter(|part| wanted(part.material))
-            .flat_map(|part| {
-                let number = part.material.number();
+/// Triangles with the numbers of their material (see `authored.wesl`): opaque ones first, the last of them those with holes,
+/// then overlays; hidden ones are left out. How many are opaque, have holes, and are overlays.
+fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 3]) {
+    let has_holes = |part: usize| {
+        let material = head.authored_material(part);
+        material.is_some_and(|m| head.authored.materials[m as usize].cutoff().is_some())
+    };
+    let of = |wanted: &dyn Fn(usize, Material) -> bool| -> Vec<[u32; 4]> {
+        (head.mesh.parts.iter().enumerate())
+            .filter(|(index, part)| wanted(*index, part.material))
+            .flat_map(|(index, part)| {
+                let authored = head.authored_material(index).map_or(0, |m| m + 1);
+                let number = part.material.number() | authored << AUTHORED_SHIFT;
                 head.mesh.triangles[part.triangles.start as usize..part.triangles.end as usize]
                     .iter()
                     .map(move |t| [t[0], t[1], t[2], number])
             })
             .collect()
     };
-    let mut triangles = of(&Material::is_opaque);
+    let mut triangles = of(&|i, m| m.is_opaque() && !has_holes(i));
+    let whole = triangles.len() as u32;
+    triangles.extend(of(&|i, m| m.is_opaque() && has_holes(i)));
     let opaque = triangles.len() as u32;
-    triangles.extend(of(&|m| !m.is_opaque() && m != Material::Hidden));
+    triangles.extend(of(&|_, m| !m.is_opaque() && m != Material::Hidden));
     let overlay = triangles.len() as u32 - opaque;
-    (triangles, opaque, overlay)
+    (triangles, [opaque, opaque - whole, overlay])
 }
 
 fn index_buffer(gpu: &Gpu, indices: &[u32]) -> wgpu::Buffer {

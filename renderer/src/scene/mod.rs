@@ -4,6 +4,7 @@ use glam::camera::rh;
 use glam::{Mat4, Vec3};
 use rubor_rig::face_state::FaceState;
 
+pub(crate) mod authored;
 mod clusters;
 mod environment;
 pub mod footprint;

@@ -7,7 +7,7 @@ use clap::{Subcommand, ValueEnum};
 use rubor_assets::export::gltf::MapEncodings;
 use rubor_assets::{export, import, synthesize};
 use rubor_rig::expression::Rig;
-use rubor_rig::head::Head;
+use rubor_rig::head::{Head, Material};
 use rubor_rig::timeline::Sequence;
 
 use super::console::{self, Progress};
@@ -61,6 +61,10 @@ pub(crate) struct Common {
     /// Mean melanin volume fraction of synthesised skin, 0 to 0.5 (0.02 very light, 0.3 very dark)
     #[arg(long)]
     melanin: Option<f32>,
+    /// What a part is: its name in the source file, and skin, mucosa, eye, teeth, gums, lash, hair, wet, hidden, or other
+    /// for the material of its author; can be repeated
+    #[arg(long, value_parser = parse_part, value_name = "NAME=MATERIAL")]
+    parts: Vec<(String, Material)>,
     /// Smaller file: maps as JPEG, no normals of shapes for other viewers
     #[arg(long)]
     small: bool,
@@ -121,6 +125,38 @@ fn parse_target(text: &str) -> Result<(String, f32), String> {
     let wrong = || format!("found {text:?}, expected PATH=WEIGHT such as nose/nose-hump-incr=0.5");
     let (path, weight) = text.rsplit_once('=').ok_or_else(wrong)?;
     Ok((path.to_owned(), weight.parse().map_err(|_| wrong())?))
+}
+
+fn parse_part(text: &str) -> Result<(String, Material), String> {
+    let names = || Material::ALL.map(name_of).join(", ");
+    let wrong =
+        || format!("found {text:?}, expected NAME=MATERIAL such as Face=skin; materials: {}", names());
+    let (part, material) = text.rsplit_once('=').ok_or_else(wrong)?;
+    let material = Material::ALL.into_iter().find(|m| name_of(*m) == material).ok_or_else(wrong)?;
+    Ok((part.to_owned(), material))
+}
+
+/// As files write it.
+fn name_of(material: Material) -> String {
+    serde_json::to_value(material).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+/// Makes parts what the user says that they are.
+fn name_parts(head: &mut Head, parts: &[(String, Material)]) -> Outcome {
+    for (name, material) in parts {
+        let mut found = false;
+        for part in head.mesh.parts.iter_mut().filter(|p| p.name == *name) {
+            part.material = *material;
+            found = true;
+        }
+        if !found {
+            let mut names: Vec<&str> = head.mesh.parts.iter().map(|p| p.name.as_str()).collect();
+            names.dedup();
+            return Err(Failure::input(format!("--parts: found no part {name:?}"))
+                .hint(format!("expected one of\n  {}", names.join("\n  "))));
+        }
+    }
+    Ok(())
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
@@ -222,7 +258,13 @@ pub(crate) fn finish_with(
     if path.extension().is_none_or(|e| e != "glb") {
         return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
     }
-    if head.maps.melanin.is_none() && common.maps > 0 {
+    name_parts(&mut head, &common.parts)?;
+    let has_skin = head.mesh.parts.iter().any(|p| p.material == Material::Skin);
+    if !has_skin && common.maps > 0 {
+        let message =
+            "no part is skin: no maps, brows and lashes are made (`--parts NAME=skin` makes a part skin)";
+        console::notes(&[Note::new(path.display().to_string(), message)]);
+    } else if head.maps.melanin.is_none() && common.maps > 0 {
         options.seed = common.seed.unwrap_or(options.seed);
         options.resolution = common.maps;
         options.melanin = common.melanin.unwrap_or(options.melanin);

@@ -9,6 +9,8 @@ pub(crate) enum Model {
     Dark,
     /// The same without maps.
     WithoutMaps,
+    /// The same with a material of its own in place of skin: tiles, bumps, metal and holes.
+    Authored,
 }
 
 /// What is read.
@@ -194,6 +196,8 @@ fn materials() -> Vec<Case> {
         of("material-mouth", "mouth", &[Model::Default]),
         of("material-cropped-hair", "scalp", &[Model::Default]),
         of("material-brow-and-lashes", "brow", &[Model::Default]),
+        of("material-authored", "portrait", &[Model::Authored]),
+        of("material-authored-sky", "environment-studio", &[Model::Authored]),
     ]
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 use rubor_assets::import;
 use rubor_renderer::channels;
 use rubor_renderer::settings::{Look, Output, Quality, Settings};
@@ -11,8 +11,11 @@ use rubor_renderer::{
     Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind, Renderer,
     Scene, native,
 };
+use rubor_rig::authored::{
+    AlphaMode, AuthoredImage, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap,
+};
 use rubor_rig::evaluate::{LightState, Shot};
-use rubor_rig::head::{Head, SkinMaps};
+use rubor_rig::head::{Head, Material, SkinMaps};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
 use rubor_rig::timeline;
 use rubor_tests::tolerance::Adapter;
@@ -52,7 +55,7 @@ pub(crate) struct Stage {
 }
 
 /// The default head and its variants.
-fn models() -> Outcome<[(Model, Head); 3]> {
+fn models() -> Outcome<[(Model, Head); 4]> {
     let file = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/head.glb"));
     let default = import::gltf::from_bytes(&std::fs::read(file)?, file)?.head;
     let mut dark = default.clone();
@@ -60,7 +63,65 @@ fn models() -> Outcome<[(Model, Head); 3]> {
         *value = (*value * DARK_MELANIN).min(0.5);
     }
     let bare = Head { maps: SkinMaps::default(), ..default.clone() };
-    Ok([(Model::Default, default), (Model::Dark, dark), (Model::WithoutMaps, bare)])
+    let authored = tiled(bare.clone());
+    Ok([
+        (Model::Default, default),
+        (Model::Dark, dark),
+        (Model::WithoutMaps, bare),
+        (Model::Authored, authored),
+    ])
+}
+
+/// A head whose skin is of tiles: half of them metal, with bumps, dark joints, and holes where alpha is none.
+fn tiled(mut head: Head) -> Head {
+    const SIDE: u32 = 16;
+    fn is_metal(x: u32, y: u32) -> bool {
+        (x / 8 + y / 8).is_multiple_of(2)
+    }
+    let image = |name: &str, texel: fn(u32, u32) -> [u8; 4]| AuthoredImage {
+        name: name.into(),
+        width: SIDE,
+        height: SIDE,
+        rgba: (0..SIDE * SIDE).flat_map(|i| texel(i % SIDE, i / SIDE)).collect(),
+    };
+    let color = image("colours", |x, y| match (x % 8, y % 8) {
+        (3 | 4, 3 | 4) if y < 8 => [255, 255, 255, 0],
+        _ if is_metal(x, y) => [255, 196, 110, 255],
+        _ => [40, 90, 170, 255],
+    });
+    let surface = image("roughness and metal", |x, y| {
+        let metal = if is_metal(x, y) { 255 } else { 0 };
+        [0, if x < 8 { 90 } else { 180 }, metal, 255]
+    });
+    let bumps = image("bumps", |x, y| {
+        let slope = |i: u32| 128 - (i % 8) as u8 * 12 + 42;
+        [slope(x), 255 - slope(y), 240, 255]
+    });
+    let joints = image("joints", |x, y| if x % 8 == 0 || y % 8 == 0 { [90, 0, 0, 255] } else { [255; 4] });
+    head.authored.images = vec![color, surface, bumps, joints];
+    let texture = |image: u32| {
+        let transform =
+            TextureTransform { scale: Vec2::splat(12.0), rotation_radians: 0.3, ..Default::default() };
+        Some(AuthoredTexture { image, uv_set: 0, transform, wrap: [Wrap::Repeat; 2] })
+    };
+    head.authored.materials = vec![AuthoredMaterial {
+        name: "tiles".into(),
+        base_color_texture: texture(0),
+        metallic_roughness_texture: texture(1),
+        normal_texture: texture(2),
+        occlusion_texture: texture(3),
+        alpha: AlphaMode::Mask { cutoff: 0.5 },
+        ..AuthoredMaterial::default()
+    }];
+    let parts = head.mesh.parts.iter_mut();
+    head.authored.of_parts = parts
+        .map(|part| {
+            let is_skin = part.material == Material::Skin;
+            part.material = if is_skin { Material::Other } else { part.material };
+            is_skin.then_some(0)
+        })
+        .collect();
+    head
 }
 
 impl Stage {

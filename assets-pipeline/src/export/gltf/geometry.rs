@@ -73,6 +73,19 @@ pub(super) fn primitives(
             let rest = vec![[colors.rest; 3]; vertices.len()];
             primitive["attributes"]["COLOR_0"] = json!(buffer.floats(&rest, Target::Vertices, false));
         }
+        let is_authored = head.authored_material(material).is_some();
+        if is_authored {
+            let second: Vec<_> =
+                vertices.iter().map(|v| head.authored.second_uv(*v)).map(|uv| uv.to_array()).collect();
+            if !head.authored.second_uvs.is_empty() {
+                primitive["attributes"]["TEXCOORD_1"] =
+                    json!(buffer.floats(&second, Target::Vertices, false));
+            }
+            let colors: Vec<_> = vertices.iter().map(|v| head.authored.color_linear(*v)).collect();
+            if !head.authored.colors_linear.is_empty() {
+                primitive["attributes"]["COLOR_0"] = json!(buffer.floats(&colors, Target::Vertices, false));
+            }
+        }
         // Every target must be there on every primitive; those that do not move it share one empty accessor.
         let mut still = None;
         let mut targets = Vec::new();
@@ -101,7 +114,12 @@ pub(super) fn primitives(
         }
         primitives.push(primitive);
         let points = buffer.indices(&points, mesh.points.len(), Target::None) as u32;
-        entries.push(PartEntry { name: part.name.clone(), material: part.material, points });
+        entries.push(PartEntry {
+            name: part.name.clone(),
+            material: part.material,
+            authored: is_authored,
+            points,
+        });
     }
     (primitives, entries)
 }

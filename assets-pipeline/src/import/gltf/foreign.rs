@@ -1,32 +1,39 @@
 //! Files of other programs: every mesh of the scene, its morph targets as shapes.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use glam::{Mat3, Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
-use gltf::{Mesh, Node, Semantic};
-use rubor_rig::head::{BlendShape, Head, Part, Vertex};
+use gltf::{Mesh, Node, Primitive, Semantic};
+use rubor_rig::head::{BlendShape, Head, Material, Part, Vertex};
 
 use super::accessor;
 use super::document::Document;
+use super::materials::Materials;
 use super::motion::{Driver, Motion};
 use super::placement::Placement;
 use super::shapes::Shapes;
 use super::weld::{Corner, weld};
 use crate::error::ImportError;
-use crate::import::materials::guess_material;
+use crate::import::materials::recognise;
 use crate::notes::Notes;
 
 struct Builder<'a> {
     document: &'a Document,
     motion: &'a Motion,
     notes: &'a mut Notes,
+    materials: Materials<'a>,
     head: Head,
     shapes: Shapes,
     /// Of each vertex of the head; points come when all are known.
     corners: Vec<Corner>,
     /// World transform of every node of the scene.
     world: HashMap<usize, Mat4>,
+    /// Of each part: no name tells what it is.
+    unnamed: Vec<bool>,
+    /// Of each part: it has no material.
+    bare: Vec<bool>,
 }
 
 /// A tree of nodes is not deeper than this.
@@ -40,7 +47,10 @@ pub(super) fn read(
 ) -> Result<(Head, Vec<(String, Driver)>), ImportError> {
     let shapes = Shapes::new(document, notes);
     let (head, corners, world) = (Head::default(), Vec::new(), HashMap::new());
-    let mut builder = Builder { document, motion, notes, head, shapes, corners, world };
+    let materials = Materials::new(document);
+    let (unnamed, bare) = (Vec::new(), Vec::new());
+    let mut builder =
+        Builder { document, motion, notes, materials, head, shapes, corners, world, unnamed, bare };
     let scene = document.gltf.default_scene().or_else(|| document.gltf.scenes().next());
     match scene {
         Some(scene) => {
@@ -138,6 +148,13 @@ impl Builder<'_> {
                 }
             };
             check("TEXCOORD_0", uvs.len())?;
+            let second_uvs = match primitive.get(&Semantic::TexCoords(1)) {
+                Some(a) => accessor::floats::<2>(document, &at("TEXCOORD_1"), &a)?,
+                None => vec![[0.0; 2]; count],
+            };
+            check("TEXCOORD_1", second_uvs.len())?;
+            let colors = colors(document, &at("COLOR_0"), &primitive, count)?;
+            check("COLOR_0", colors.len())?;
             let mut targets: Vec<(u32, Vec<[f32; 3]>)> = Vec::new();
             for (t, target) in primitive.morph_targets().enumerate() {
                 // An accessor without data moves no points.
@@ -193,21 +210,84 @@ impl Builder<'_> {
                 }
                 self.corners.push(Corner { position, normal: normal.normalize_or_zero(), moved });
                 self.head.mesh.vertices.push(Vertex { point: 0, uv: Vec2::from_array(uvs[v]) });
+                let authored = &mut self.materials.authored;
+                authored.second_uvs.push(Vec2::from_array(second_uvs[v]));
+                authored.colors_linear.push(colors[v]);
             }
             let start = self.head.mesh.triangles.len() as u32;
             self.head.mesh.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
             let end = self.head.mesh.triangles.len() as u32;
-            let material = primitive.material();
-            let name = material.name().or(mesh.name()).unwrap_or("mesh").to_owned();
-            let material = guess_material(&name);
-            self.head.mesh.parts.push(Part { name, material, triangles: start..end });
+            self.part(mesh, node, &primitive, start..end);
         }
         Ok(())
     }
 
+    /// A part: what names say it is, and the material of its author.
+    fn part(
+        &mut self,
+        mesh: &Mesh<'_>,
+        node: Option<usize>,
+        primitive: &Primitive<'_>,
+        triangles: Range<u32>,
+    ) {
+        let material = primitive.material();
+        let node = node.and_then(|n| self.document.gltf.nodes().nth(n));
+        let node = node.as_ref().and_then(Node::name);
+        // Names of a mesh of several materials speak of all of them.
+        let is_whole = mesh.primitives().len() == 1;
+        let names = [material.name(), mesh.name().filter(|_| is_whole), node.filter(|_| is_whole)];
+        let recognised = names.iter().flatten().find_map(|name| recognise(name));
+        let name = material.name().or(mesh.name()).or(node).unwrap_or("mesh").to_owned();
+        let authored = self.materials.read(material.index(), self.notes);
+        let is_textured = self.materials.authored.materials[authored as usize].base_color_texture.is_some();
+        let kind = match recognised {
+            // Eyes, teeth, hair and so on of rubor take texture coordinates of its own.
+            Some(kind)
+                if is_textured && !matches!(kind, Material::Skin | Material::Hidden | Material::Other) =>
+            {
+                let message = "textured eyes, teeth, hair and lashes keep the look of their author";
+                self.notes.add(message, name.as_str());
+                Material::Other
+            }
+            Some(kind) => kind,
+            None => Material::Other,
+        };
+        self.head.mesh.parts.push(Part { name, material: kind, triangles });
+        self.materials.authored.of_parts.push(Some(authored));
+        self.unnamed.push(recognised.is_none());
+        self.bare.push(material.index().is_none());
+    }
+
+    /// Parts that no name tells: theirs is the look of their author, and they are skin only where the file has no look at all.
+    fn name_rest(&mut self) {
+        let parts = &mut self.head.mesh.parts;
+        let has_skin = parts.iter().any(|p| p.material == Material::Skin);
+        if !has_skin && self.bare.iter().all(|b| *b) && self.unnamed.iter().any(|u| *u) {
+            for (part, _) in parts.iter_mut().zip(&self.unnamed).filter(|(_, unnamed)| **unnamed) {
+                part.material = Material::Skin;
+                let message =
+                    "parts without a material, and with no name that tells what they are, are taken for skin";
+                self.notes.add(message, part.name.as_str());
+            }
+            return;
+        }
+        for (part, _) in parts.iter().zip(&self.unnamed).filter(|(_, unnamed)| **unnamed) {
+            let message = "parts that no name tells keep the look of their author (`rubor import --parts NAME=skin` makes one skin)";
+            self.notes.add(message, part.name.as_str());
+        }
+        if !has_skin {
+            self.notes.say(
+                "no part is skin: blood, wrinkles and scattering show nowhere (`rubor import --parts NAME=skin` makes one skin)",
+            );
+        }
+    }
+
     /// Points from vertices, offsets of shapes by point.
-    fn finish(self) -> (Head, Vec<(String, Driver)>) {
+    fn finish(mut self) -> (Head, Vec<(String, Driver)>) {
+        self.name_rest();
         let (mut head, shapes) = (self.head, self.shapes.finish());
+        head.authored = self.materials.authored;
+        head.authored.drop_defaults();
         let (point_of, first_of) = weld(&self.corners);
         head.mesh.vertices.iter_mut().zip(point_of).for_each(|(vertex, point)| vertex.point = point);
         head.shapes = shapes
@@ -224,6 +304,26 @@ impl Builder<'_> {
             }
         }
         (head, shapes)
+    }
+}
+
+/// Factors of the base colour of each vertex.
+pub(super) fn colors(
+    document: &Document,
+    at: &str,
+    primitive: &Primitive<'_>,
+    count: usize,
+) -> Result<Vec<[f32; 4]>, ImportError> {
+    match primitive.get(&Semantic::Colors(0)) {
+        Some(a) if a.dimensions().multiplicity() == 3 => {
+            let colors = accessor::floats::<3>(document, at, &a)?;
+            Ok(colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0].map(|c: f32| c.max(0.0))).collect())
+        }
+        Some(a) => {
+            let colors = accessor::floats::<4>(document, at, &a)?;
+            Ok(colors.into_iter().map(|color| color.map(|c| c.max(0.0))).collect())
+        }
+        None => Ok(vec![[1.0; 4]; count]),
     }
 }
 

@@ -4,7 +4,7 @@
 //! .glb or .gltf + buffers --document--> accessors --> primitives of every mesh node
 //!   own file (RUBOR_facial_appearance): points, parts, maps as stored
 //!   foreign file: node transforms applied, shapes united where names and weights agree, points welded by distance and
-//!                 angle, materials guessed from names
+//!                 angle, parts recognised by names; all others keep the material of their author
 //! first animation --channels--> tracks by node; default weights where nothing is keyed
 //! ```
 //!
@@ -15,6 +15,7 @@ mod channels;
 mod document;
 mod foreign;
 mod lint;
+mod materials;
 mod motion;
 mod names;
 mod own;
@@ -70,7 +71,7 @@ pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError
     let document = Document::load(bytes, path, &mut notes)?;
     let motion = Motion::read(&document, &mut notes);
     let (mut imported, shapes) = match document.gltf.extension_value(NAME) {
-        Some(extension) => own::read(&document, extension, &motion)?,
+        Some(extension) => own::read(&document, extension, &motion, &mut notes)?,
         None => {
             let (head, shapes) = foreign::read(&document, &motion, &mut notes)?;
             (ImportedHead { head, ..ImportedHead::default() }, shapes)

@@ -4,22 +4,26 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 use gltf::Semantic;
+use rubor_rig::authored::Authored;
 use rubor_rig::head::{
     BlendShape, Distribution, Head, Mesh, OcclusionChange, Part, SkinMaps, Vertex, WrinkleZone,
 };
 use rubor_rig::map::Map;
 
 use super::document::Document;
+use super::materials::Materials;
 use super::motion::{Driver, Motion};
-use super::{ImportedHead, accessor, names};
+use super::{ImportedHead, accessor, foreign, names};
 use crate::error::ImportError;
 use crate::facial_appearance::{ChannelLayout, FacialAppearance, MapEntries, MapEntry, NAME, VERSION};
 use crate::image_io::{Limits, decode_stored};
+use crate::notes::Notes;
 
 pub(super) fn read(
     document: &Document,
     extension: &serde_json::Value,
     motion: &Motion,
+    notes: &mut Notes,
 ) -> Result<(ImportedHead, Vec<(String, Driver)>), ImportError> {
     let version = &extension["version"];
     if version.as_u64() != Some(u64::from(VERSION)) {
@@ -33,11 +37,13 @@ pub(super) fn read(
         .nth(extension.mesh as usize)
         .ok_or_else(|| document.fail(NAME, format!("mesh {}", extension.mesh), "an existing mesh"))?;
     let (mesh, shapes) = geometry(document, &source, &extension)?;
+    let authored = authored(document, &source, &extension, notes)?;
     let mut head = Head {
         name: extension.name,
         mesh,
         shapes,
         maps: maps(document, &extension.maps)?,
+        authored,
         landmarks: extension.landmarks.into_iter().map(|(name, p)| (name, Vec3::from_array(p))).collect(),
         provenance: extension.provenance,
     };
@@ -164,6 +170,41 @@ fn geometry(
         BlendShape { name, points, offsets, ..BlendShape::default() }
     });
     Ok((mesh, shapes.collect()))
+}
+
+/// Materials of the parts that are drawn in them, and what these read of vertices.
+fn authored(
+    document: &Document,
+    source: &gltf::Mesh<'_>,
+    extension: &FacialAppearance,
+    notes: &mut Notes,
+) -> Result<Authored, ImportError> {
+    if extension.parts.iter().all(|part| !part.authored) {
+        return Ok(Authored::default());
+    }
+    let mut materials = Materials::new(document);
+    let (mut second_uvs, mut colors_linear, mut of_parts) = (Vec::new(), Vec::new(), Vec::new());
+    for (i, (primitive, part)) in source.primitives().zip(&extension.parts).enumerate() {
+        let at = |what: &str| format!("mesh {}, primitive {i}, {what}", source.index());
+        let count = primitive.get(&Semantic::Positions).map_or(0, |a| a.count());
+        let (mut uvs, mut colors) = (vec![[0.0; 2]; count], vec![[1.0; 4]; count]);
+        if part.authored {
+            if let Some(a) = primitive.get(&Semantic::TexCoords(1)) {
+                uvs = accessor::floats::<2>(document, &at("TEXCOORD_1"), &a)?;
+            }
+            colors = foreign::colors(document, &at("COLOR_0"), &primitive, count)?;
+        }
+        if uvs.len() != count || colors.len() != count {
+            let found = format!("{} texture coordinates and {} colours", uvs.len(), colors.len());
+            return Err(document.fail(&at("TEXCOORD_1"), found, format!("{count}, one per vertex")));
+        }
+        second_uvs.extend(uvs.into_iter().map(Vec2::from_array));
+        colors_linear.extend(colors);
+        of_parts.push(part.authored.then(|| materials.read(primitive.material().index(), notes)));
+    }
+    let mut authored = Authored { of_parts, second_uvs, colors_linear, ..materials.authored };
+    authored.drop_defaults();
+    Ok(authored)
 }
 
 fn maps(document: &Document, entries: &MapEntries) -> Result<SkinMaps, ImportError> {

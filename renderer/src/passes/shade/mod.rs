@@ -49,13 +49,22 @@
 //! The iris is lit as the bowl on which the cornea gathers light, brightest opposite to a lamp's reflection; pigment,
 //! vessels, caruncle, papillae and patches of the lining are noise of texture coordinates, made for the default head.
 //!
+//! Parts that keep the material of their author (`authored.wesl`) have a dispatch of their own, which heads without such
+//! parts do not have: metallic-roughness of glTF 2.0, appendix B (GGX, Smith, Schlick, Lambert), lamps and shadows as for
+//! skin, the environment by a table (`ggx_albedo`). It does not cull backs of single-sided parts.
+//!
 //! Does not: reflect one part of the head in another; carry light between parts of an eye or the mouth.
 
+#[cfg(test)]
+mod authored_tests;
 pub(crate) mod directional_albedo;
+mod ggx_albedo;
 #[cfg(test)]
 pub(crate) mod reference;
 #[cfg(test)]
 mod tests;
+
+use std::sync::OnceLock;
 
 use glam::{Vec3, Vec4};
 use rubor_rig::head::{EYE_RADIUS_MM, LIMBUS_UV, Material};
@@ -67,6 +76,7 @@ use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder, texture};
 use crate::error::RenderError;
 use crate::passes::pixel_groups;
+use crate::scene::head::AUTHORED_SHIFT;
 use crate::scene::lamp::{GpuLight, Illumination};
 use crate::scene::view::Seen;
 use crate::scene::{MAX_HEMOGLOBIN, MAX_LIGHTS, PosedHead};
@@ -74,6 +84,7 @@ use crate::settings::{ColorMethod, Quality, SpecularMethod, WrinkleMethod};
 
 const SHADER: Module = module!("shade", "shade.wesl");
 const SAMPLES_SHADER: Module = module!("shade_light_samples", "light_samples.wesl");
+const AUTHORED_SHADER: Module = module!("shade_authored", "authored.wesl");
 const PARTS: [Module; 3] = [
     module!("shade_eye", "eye.wesl"),
     module!("shade_micro", "micro.wesl"),
@@ -95,9 +106,15 @@ pub(crate) fn samples_program() -> Program {
     with_constants(Program::new(SAMPLES_SHADER).with(&[SHADER]))
 }
 
+/// The shader of the pass that lights what keeps the material of its author.
+pub(crate) fn authored_program() -> Program {
+    with_constants(Program::new(AUTHORED_SHADER).with(&[SHADER]))
+}
+
 fn with_constants(program: Program) -> Program {
     program
         .with(&PARTS)
+        .constant("AUTHORED_SHIFT", AUTHORED_SHIFT)
         .constant("FOLLOW_PER_MM", FOLLOW_PER_MM)
         .constant("MAX_HEMOGLOBIN", MAX_HEMOGLOBIN)
         .constant("TRANSMIT_RINGS", RINGS as u32)
@@ -248,6 +265,8 @@ pub(crate) struct Shade {
     kernel: Kernel,
     /// Made by the first frame that lights points of the surface.
     samples_kernel: Option<Kernel>,
+    /// Made by the first frame that shows a material of an author.
+    authored_kernel: OnceLock<(Kernel, wgpu::TextureView)>,
     trilinear_repeat: wgpu::Sampler,
     linear_clamp: wgpu::Sampler,
     compare: wgpu::Sampler,
@@ -271,6 +290,7 @@ impl Shade {
             directional_albedo: (specular, upload_directional_albedo(gpu, specular)),
             kernel: Kernel::new(gpu, "shade", &program(), "shade"),
             samples_kernel: None,
+            authored_kernel: OnceLock::new(),
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
                 label: Some("trilinear repeat"),
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -311,7 +331,7 @@ impl Shade {
         });
         let params: Vec<_> = heads.iter().map(|h| r.uniform("shade", &params(lighting, h))).collect();
         let first = lighting.first.unwrap_or(lighting.seen);
-        let each = heads.iter().zip(&params).map(|(h, params)| {
+        let resources = |h, params| {
             let mut resources = self.resources(lighting, h, params);
             resources.extend([
                 ("depth", lighting.seen.depth.bound()),
@@ -321,9 +341,23 @@ impl Shade {
                 ("albedo_out", lit.albedo.bound()),
                 ("direct_out", lit.direct.bound()),
             ]);
-            (resources, pixel_groups(size))
-        });
+            resources
+        };
+        let each = heads.iter().zip(&params).map(|(h, params)| (resources(h, params), pixel_groups(size)));
         r.dispatch_each(&self.kernel, each);
+        if heads.iter().all(|h| h.head.authored.is_none()) {
+            return lit;
+        }
+        let (kernel, ggx_albedo) = self.authored_kernel.get_or_init(|| authored_kernel(r.gpu));
+        let authored = heads.iter().zip(&params).filter_map(|(h, params)| {
+            let authored = h.head.authored.as_ref()?;
+            let mut resources = resources(h, params);
+            resources.extend(authored.resources());
+            resources.push(("authored_data", authored.data.bound()));
+            resources.push(("ggx_albedo", ggx_albedo.bound()));
+            Some((resources, pixel_groups(size)))
+        });
+        r.dispatch_each(kernel, authored);
         lit
     }
 
@@ -381,6 +415,12 @@ impl Shade {
             ("skin_color", posed.head.skin_color.bound()),
         ]
     }
+}
+
+fn authored_kernel(gpu: &Gpu) -> (Kernel, wgpu::TextureView) {
+    let table = vec![vec![ggx_albedo::table()]];
+    let table = texture::upload_half(gpu, "GGX albedo", ggx_albedo::SIZE, &table);
+    (Kernel::new(gpu, "shade authored", &authored_program(), "shade_authored"), table)
 }
 
 fn upload_directional_albedo(gpu: &Gpu, method: SpecularMethod) -> wgpu::TextureView {

@@ -52,3 +52,58 @@ impl Skin {
         cos_light * (self.albedo / PI * entering * leaving + self.specular * lobe)
     }
 }
+
+/// The metallic-roughness model of glTF 2.0, appendix B, with one lobe of GGX.
+pub(crate) struct MetallicRoughness {
+    /// Linear base colour of one channel.
+    pub(crate) base: f64,
+    /// 0 to 1.
+    pub(crate) metallic: f64,
+    /// Perceptual.
+    pub(crate) roughness: f64,
+}
+
+impl MetallicRoughness {
+    /// Radiance towards a viewer for unit irradiance across the light; all unit vectors (B.2 and B.3):
+    /// cos(L) ((1 - F) (1 - metallic) base / pi + F D G / (4 cos(L) cos(V))).
+    pub(crate) fn radiance(&self, normal: DVec3, to_light: DVec3, to_viewer: DVec3) -> f64 {
+        let (cos_light, cos_viewer) = (normal.dot(to_light), normal.dot(to_viewer));
+        if cos_light <= 0.0 || cos_viewer <= 0.0 {
+            return 0.0;
+        }
+        let half = (to_light + to_viewer).normalize();
+        let a2 = self.roughness.powi(4);
+        let d = a2 / (PI * (normal.dot(half).powi(2) * (a2 - 1.0) + 1.0).powi(2));
+        let masking = |cosine: f64| 2.0 * cosine / (cosine + (a2 + (1.0 - a2) * cosine * cosine).sqrt());
+        let g = masking(cos_light) * masking(cos_viewer);
+        let f0 = 0.04 + (self.base - 0.04) * self.metallic;
+        let fresnel = f0 + (1.0 - f0) * (1.0 - half.dot(to_viewer)).powi(5);
+        let diffuse = (1.0 - fresnel) * (1.0 - self.metallic) * self.base / PI;
+        cos_light * diffuse + fresnel * d * g / (4.0 * cos_viewer)
+    }
+
+    /// Share of an even sky that it sends to a viewer: the integral of the radiance over the hemisphere of lights.
+    pub(crate) fn reflected_sky(&self, cos_viewer: f64) -> f64 {
+        let to_viewer = DVec3::new((1.0 - cos_viewer * cos_viewer).sqrt(), 0.0, cos_viewer);
+        let (rings, spokes) = (600, 600);
+        let mut sum = 0.0;
+        for ring in 0..rings {
+            // Half vectors evenly by the square root of their sine: the lobe is narrow about the normal.
+            let theta = 0.5 * PI * ((f64::from(ring) + 0.5) / f64::from(rings)).powi(2);
+            let d_theta = PI * (f64::from(ring) + 0.5) / f64::from(rings) / f64::from(rings);
+            for spoke in 0..spokes {
+                let phi = 2.0 * PI * (f64::from(spoke) + 0.5) / f64::from(spokes);
+                let half = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+                let along = half.dot(to_viewer);
+                if along <= 0.0 {
+                    continue;
+                }
+                let to_light = 2.0 * along * half - to_viewer;
+                // d(light) = 4 cos(H, V) d(half).
+                let solid = 4.0 * along * theta.sin() * d_theta * 2.0 * PI / f64::from(spokes);
+                sum += self.radiance(DVec3::Z, to_light, to_viewer) * solid;
+            }
+        }
+        sum
+    }
+}

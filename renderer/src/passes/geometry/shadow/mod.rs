@@ -9,23 +9,34 @@
 //! that shadows do not crawl as the camera moves. All triangles are drawn, front and back: a mouth or a nostril must
 //! block light from either side. The soft edge is in `shade` (percentage-closer soft shadows).
 
+use std::sync::OnceLock;
+
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{
     Attachments, Bind, Draw, Gpu, Image, ImageSpec, Raster, RasterKernel, Recorder, depth_attachment,
 };
 use crate::scene::PosedHead;
+use crate::scene::head::AUTHORED_SHIFT;
 use crate::scene::lamp::LightView;
 
 const SHADER: Module = module!("shadow", "shadow.wesl");
+const CUT_SHADER: Module = module!("shadow_cut", "cut.wesl");
 
 /// The shader of the pass.
 pub(crate) fn program() -> Program {
     Program::new(SHADER)
 }
 
-/// The pipeline of the pass.
+/// The shader of what has holes.
+pub(crate) fn cut_program() -> Program {
+    Program::new(CUT_SHADER).constant("AUTHORED_SHIFT", AUTHORED_SHIFT)
+}
+
+/// The pipelines of the pass.
 pub(crate) struct Shadow {
     kernel: RasterKernel,
+    /// For triangles with holes, made by the first frame that has such.
+    cut_kernel: OnceLock<RasterKernel>,
 }
 
 impl Shadow {
@@ -42,7 +53,7 @@ impl Shadow {
                 writes_depth: true,
             },
         );
-        Self { kernel }
+        Self { kernel, cut_kernel: OnceLock::new() }
     }
 
     /// Draws the opaque triangles of all heads as lights see them, one layer per light; one empty layer without lights.
@@ -62,10 +73,45 @@ impl Shadow {
             let each = heads.iter().map(|h| {
                 let resources =
                     vec![("clip_from_world", clip_from_world.bound()), ("positions", h.positions.bound())];
-                (resources, Draw::Indexed(&h.head.opaque_points, h.head.opaque_triangles * 3))
+                let whole = h.head.opaque_triangles - h.head.cut_triangles;
+                (resources, Draw::Indexed(&h.head.opaque_points, whole * 3))
             });
             r.draw_each(&self.kernel, Attachments { colors: Vec::new(), depth }, each);
+            let with_holes: Vec<_> = heads.iter().filter(|h| h.head.cut_triangles > 0).collect();
+            if with_holes.is_empty() {
+                continue;
+            }
+            let first = |h: &PosedHead<'_>| h.head.opaque_triangles - h.head.cut_triangles;
+            let numbers: Vec<_> =
+                with_holes.iter().map(|h| r.uniform("head", &[h.index, first(h), 0, 0])).collect();
+            let each = with_holes.iter().zip(&numbers).filter_map(|(h, number)| {
+                let mut resources = h.head.cut_resources()?;
+                resources.extend([
+                    ("clip_from_world", clip_from_world.bound()),
+                    ("positions", h.positions.bound()),
+                    ("head", number.bound()),
+                ]);
+                Some((resources, Draw::Corners(h.head.cut_triangles * 3)))
+            });
+            let kernel = self.cut_kernel.get_or_init(|| cut_kernel(r.gpu));
+            let depth = depth_attachment(&view, wgpu::LoadOp::Load);
+            r.draw_each(kernel, Attachments { colors: Vec::new(), depth }, each);
         }
         maps
     }
+}
+
+fn cut_kernel(gpu: &Gpu) -> RasterKernel {
+    RasterKernel::new(
+        gpu,
+        &Raster {
+            label: "shadow of holes",
+            program: cut_program(),
+            vertex: "cut_vertex",
+            fragment: Some("cut_fragment"),
+            targets: &[],
+            nearer: wgpu::CompareFunction::Less,
+            writes_depth: true,
+        },
+    )
 }

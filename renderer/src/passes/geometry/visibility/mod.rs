@@ -6,7 +6,11 @@
 //!
 //! Theory: Burns and Hunt 2013, "The visibility buffer". The only rasterised pass of the frame that covers the head;
 //! its fragment shader stores one integer, everything else is compute (ARCHITECTURE.md has the measurement).
+//! Parts that keep a material with holes (alpha mask, or alpha that is cut at one half) are drawn after the others by a
+//! pipeline that reads their alpha; heads without such parts do not have it.
 //! Reversed infinite depth keeps 24 bits at any distance (Lapidous and Jiao 1999).
+
+use std::sync::OnceLock;
 
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{
@@ -14,8 +18,10 @@ use crate::device::{
     depth_attachment,
 };
 use crate::scene::PosedHead;
+use crate::scene::head::AUTHORED_SHIFT;
 
 const SHADER: Module = module!("visibility", "visibility.wesl");
+const CUT_SHADER: Module = module!("visibility_cut", "cut.wesl");
 
 /// The shader of the pass, for devices with and without a primitive index.
 pub(crate) fn program(numbered: bool) -> Program {
@@ -30,9 +36,16 @@ pub(crate) fn entries(numbered: bool) -> [&'static str; 2] {
     }
 }
 
-/// The pipeline of the pass.
+/// The shader of what has holes.
+pub(crate) fn cut_program() -> Program {
+    Program::new(CUT_SHADER).constant("AUTHORED_SHIFT", AUTHORED_SHIFT)
+}
+
+/// The pipelines of the pass.
 pub(crate) struct Visibility {
     kernel: RasterKernel,
+    /// For triangles with holes, made by the first frame that has such.
+    cut_kernel: OnceLock<RasterKernel>,
     is_numbered: bool,
 }
 
@@ -56,7 +69,7 @@ impl Visibility {
                 writes_depth: true,
             },
         );
-        Self { kernel, is_numbered }
+        Self { kernel, cut_kernel: OnceLock::new(), is_numbered }
     }
 
     /// Draws the opaque triangles of all heads: ids and depth.
@@ -69,7 +82,8 @@ impl Visibility {
     ) -> [Image; 2] {
         let ids = r.image("ids", ImageSpec::attachment(size, wgpu::TextureFormat::R32Uint));
         let depth = r.image("depth", ImageSpec::attachment(size, wgpu::TextureFormat::Depth32Float));
-        let numbers: Vec<_> = heads.iter().map(|h| r.uniform("head", &[h.index, 0, 0, 0])).collect();
+        let first = |h: &PosedHead<'_>| h.head.opaque_triangles - h.head.cut_triangles;
+        let numbers: Vec<_> = heads.iter().map(|h| r.uniform("head", &[h.index, first(h), 0, 0])).collect();
         let each = heads.iter().zip(&numbers).map(|(h, number)| {
             let resources = vec![
                 ("view", view.bound()),
@@ -77,7 +91,7 @@ impl Visibility {
                 ("head", number.bound()),
                 ("points", h.head.opaque_points.bound()),
             ];
-            let corners = h.head.opaque_triangles * 3;
+            let corners = (h.head.opaque_triangles - h.head.cut_triangles) * 3;
             let draw = match self.is_numbered {
                 true => Draw::Indexed(&h.head.opaque_points, corners),
                 false => Draw::Corners(corners),
@@ -89,8 +103,41 @@ impl Visibility {
             depth: depth_attachment(depth.view(), wgpu::LoadOp::Clear(0.0)),
         };
         r.draw_each(&self.kernel, attachments, each);
+        let cut = heads.iter().zip(&numbers).filter_map(|(h, number)| {
+            let mut resources = h.head.cut_resources()?;
+            resources.extend([
+                ("view", view.bound()),
+                ("positions", h.positions.bound()),
+                ("head", number.bound()),
+            ]);
+            Some((resources, Draw::Corners(h.head.cut_triangles * 3)))
+        });
+        let cut: Vec<_> = cut.collect();
+        if !cut.is_empty() {
+            let kernel = self.cut_kernel.get_or_init(|| cut_kernel(r.gpu));
+            let attachments = Attachments {
+                colors: vec![color_attachment(ids.view(), wgpu::LoadOp::Load)],
+                depth: depth_attachment(depth.view(), wgpu::LoadOp::Load),
+            };
+            r.draw_each(kernel, attachments, cut);
+        }
         [ids, depth]
     }
+}
+
+fn cut_kernel(gpu: &Gpu) -> RasterKernel {
+    RasterKernel::new(
+        gpu,
+        &Raster {
+            label: "visibility of holes",
+            program: cut_program(),
+            vertex: "cut_vertex",
+            fragment: Some("cut_fragment"),
+            targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
+            nearer: wgpu::CompareFunction::Greater,
+            writes_depth: true,
+        },
+    )
 }
 
 #[cfg(test)]
