@@ -97,7 +97,7 @@ fn why_a_wrinkle_zone_does_not_show() {
         &visible(&good(), RIG, Some(r#"{"calm": 1}"#)),
         &["wrinkle zones: the sequence never reaches 1", "chin (joy)"],
     );
-    says(&visible(&good(), RIG, Some(r#"{"joy": 1, "calm": 1}"#)), &["joy raise it and calm take it away"]);
+    says(&visible(&good(), RIG, Some(r#"{"joy": 1, "calm": 1}"#)), &["raised by joy and taken away by calm"]);
 }
 
 #[test]

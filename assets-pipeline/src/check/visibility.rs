@@ -257,9 +257,9 @@ impl<'a> Reach<'a> {
         let against: Vec<&str> =
             asks.iter().filter(|a| a.weight < 0.0 && self.is_used(a.name)).map(|a| a.name).collect();
         let why = if against.is_empty() {
-            format!("its weight stays below {LEAST_WEIGHT:.3}, although {} raise it", list(&used))
+            format!("its weight stays below {LEAST_WEIGHT:.3}, although it is raised by {}", list(&used))
         } else {
-            format!("{} raise it and {} take it away at the same time", list(&used), list(&against))
+            format!("it is raised by {} and taken away by {} at the same time", list(&used), list(&against))
         };
         Some(Reason::Wrong(why, "key them one after the other, or change their weights".into()))
     }

@@ -109,6 +109,11 @@ impl Number {
         self.range.contains(&n) && (n - self.range.start()).is_multiple_of(self.step)
     }
 
+    fn closest(&self, n: u32) -> u32 {
+        let (least, most) = (*self.range.start(), *self.range.end());
+        least + (n.clamp(least, most) - least) / self.step * self.step
+    }
+
     fn values(&self) -> String {
         let (least, most) = (self.range.start(), self.range.end());
         match self.step {
@@ -160,7 +165,7 @@ impl Group {
             let nearest = nearest(name, names).and_then(|near| {
                 let row = self.methods.iter().find(|m| m.name == near)?;
                 match (&row.number, number.map(str::parse::<u32>)) {
-                    (Some(n), Some(Ok(number))) if n.contains(number) => Some(format!("{near}:{number}")),
+                    (Some(n), Some(Ok(number))) => Some(format!("{near}:{}", n.closest(number))),
                     _ => Some(row.example()),
                 }
             });

@@ -340,12 +340,12 @@ fn print(arguments: &Arguments, reports: &mut [Report]) -> Outcome {
                 say!("{line}");
             }
         }
-        say!("{errors} errors, {warnings} warnings, {notes} notes");
+        say!("errors: {errors}, warnings: {warnings}, notes: {notes}");
     }
     match (errors, warnings) {
         (0, 0) => Ok(()),
         (0, _) if !arguments.strict => Ok(()),
-        (0, n) => Err(Failure::input(format!("--strict: {n} warnings"))),
-        (n, _) => Err(Failure::input(format!("{n} errors"))),
+        (0, n) => Err(Failure::input(format!("--strict: warnings: {n}"))),
+        (n, _) => Err(Failure::input(format!("errors: {n}"))),
     }
 }

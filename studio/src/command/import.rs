@@ -24,9 +24,9 @@ pub(crate) struct Arguments {
     /// Folder of OBJ files (a neutral and one for each shape), or a .glb or .gltf file
     #[arg(required = true)]
     source: Option<PathBuf>,
-    /// Unit of length of OBJ files
-    #[arg(long, value_enum, default_value = "cm")]
-    units: Units,
+    /// Unit of length of OBJ files [default: cm]
+    #[arg(long, value_enum)]
+    units: Option<Units>,
     /// Also write the animation of a .glb or .gltf file (.json)
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
@@ -170,10 +170,17 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             if source.is_dir() && arguments.sequence.is_some() {
                 return Err(Failure::input("--sequence: a folder of OBJ files has no animation"));
             }
+            if !source.is_dir() && arguments.units.is_some() {
+                return Err(Failure::input("--units: found a file, expected a folder of OBJ files")
+                    .hint("glTF is in metres: scale the mesh in the program that wrote it"));
+            }
+            if !source.is_dir() && arguments.common.subdivide.is_some() {
+                return Err(Failure::input("--subdivide: found a file, expected a folder of OBJ files"));
+            }
             let head = if source.is_dir() {
                 let mut options = import::obj_set::Options {
                     folder: source.clone(),
-                    units: arguments.units.into(),
+                    units: arguments.units.unwrap_or(Units::Cm).into(),
                     ..import::obj_set::Options::default()
                 };
                 options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
@@ -272,6 +279,9 @@ pub(crate) fn finish_with(
         let step = || progress.lock().unwrap_or_else(PoisonError::into_inner).step();
         synthesize::synthesize_into_with(&mut head, &options, &step).map_err(Failure::input)?;
         progress.into_inner().unwrap_or_else(PoisonError::into_inner).end();
+    } else if common.seed.is_some() || common.melanin.is_some() {
+        let message = "no maps are made: --seed and --melanin have no effect";
+        console::notes(&[Note::new(path.display().to_string(), message)]);
     }
     let options = export::gltf::Options {
         color_map_size: if common.small { 1024 } else { 2048 },
