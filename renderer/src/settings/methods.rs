@@ -109,6 +109,7 @@ impl Number {
         self.range.contains(&n) && (n - self.range.start()).is_multiple_of(self.step)
     }
 
+    /// The value of it that is closest to `n`, the lesser of two.
     fn closest(&self, n: u32) -> u32 {
         let (least, most) = (*self.range.start(), *self.range.end());
         least + (n.clamp(least, most) - least) / self.step * self.step
@@ -454,6 +455,14 @@ mod tests {
             message.ends_with("did you mean \"smaa-s2x\"?") || message.contains("did you mean"),
             "{message}"
         );
+        for (wrong, near) in [
+            ("separable:18", "separable:17"),
+            ("separable:99", "separable:65"),
+            ("seperable:2", "separable:5"),
+        ] {
+            let message = wrong.parse::<ScatterMethod>().expect_err("it is wrong").to_string();
+            assert!(message.ends_with(&format!("did you mean {near:?}?")), "{message}");
+        }
         assert!(ScatterMethod::Separable(4).validate().is_err());
     }
 

@@ -42,6 +42,11 @@ pub(crate) struct Arguments {
     settings: SettingsFlags<Timing>,
 }
 
+fn parse_time(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|t| t.is_finite() && *t >= 0.0);
+    number.ok_or_else(|| format!("found {text:?}, expected a time in seconds, 0 or more"))
+}
+
 #[derive(Clone, Debug)]
 struct Timing;
 impl Purpose for Timing {

@@ -307,3 +307,27 @@ fn report(head: &Head, path: &Path) -> Outcome {
     );
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use rubor_rig::head::Part;
+
+    use super::*;
+
+    #[test]
+    fn parts_become_what_the_user_says() {
+        let mut head = Head::default();
+        for name in ["a=b", "hat", "a=b"] {
+            head.mesh.parts.push(Part { name: name.into(), material: Material::Other, triangles: 0..0 });
+        }
+        let parts = ["a=b=skin", "hat=hidden"].map(|text| parse_part(text).unwrap());
+        name_parts(&mut head, &parts).unwrap();
+        let found: Vec<Material> = head.mesh.parts.iter().map(|p| p.material).collect();
+        assert_eq!(found, [Material::Skin, Material::Hidden, Material::Skin]);
+        let unknown = name_parts(&mut head, &[("nose".into(), Material::Skin)]).unwrap_err();
+        assert!(unknown.to_string().contains("\"nose\""), "{unknown}");
+        for wrong in ["hat", "hat=Skin", "hat=felt"] {
+            assert!(parse_part(wrong).unwrap_err().contains("skin, mucosa"), "{wrong}");
+        }
+    }
+}

@@ -282,8 +282,8 @@ fn check_extensions(json: &gltf_json::Root, path: &Path) -> Result<(), ImportErr
     Ok(())
 }
 
-/// Lists in which a fault changes nothing that is read here: parts take the name of their material, own maps come from
-/// images, which are checked where they are read.
+/// Lists in which a fault never costs the head: `materials` reads them from the JSON and says what it leaves out, own maps
+/// come from images, which are checked where they are read.
 const UNREAD: [&str; 4] = ["materials", "textures", "samplers", "images"];
 
 /// The checks of the `gltf` crate, without which it panics. Two faults are none here: accessors without data are zeros in

@@ -233,8 +233,8 @@ impl Builder<'_> {
         let material = primitive.material();
         let node = node.and_then(|n| self.document.gltf.nodes().nth(n));
         let node = node.as_ref().and_then(Node::name);
-        // Names of a mesh of several materials speak of all of them.
-        let is_whole = mesh.primitives().len() == 1;
+        // The name of a mesh of several materials speaks of no one of them.
+        let is_whole = mesh.primitives().len() == 1 || material.index().is_none();
         let names = [material.name(), mesh.name().filter(|_| is_whole), node.filter(|_| is_whole)];
         let recognised = names.iter().flatten().find_map(|name| recognise(name));
         let name = material.name().or(mesh.name()).or(node).unwrap_or("mesh").to_owned();
