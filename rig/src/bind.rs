@@ -12,7 +12,7 @@
 //! single shape is used as authored, also below 0 and above 1, as glTF allows: the limits of that shape are widened to
 //! its track. Combinations read their drivers clamped to 0..1; in-betweens extrapolate their first and last segment.
 //!
-//! Source: zones from papers/004 section 8.2 (negative weights, clamped sum), distributions from eq. 7.6 (weights sum to
+//! Source: zones from Jimenez 2012 section 8.2 (negative weights, clamped sum), distributions from eq. 7.6 (weights sum to
 //! one with the neutral), global scale from section 7.7. Ours: how several distributions share when they ask for more
 //! than one together (in proportion, nothing left for the neutral), and that global scales add their differences from 1,
 //! so that the order of expressions does not matter and half an expression has half its effect.

@@ -57,14 +57,14 @@ pub struct Expression {
     #[serde(default)]
     pub shapes: BTreeMap<String, f32>,
     /// Weight of each wrinkle zone by name. Negative weights cancel wrinkles of other expressions; the sum over
-    /// expressions is clamped to 0..1 (papers/004 section 8.2).
+    /// expressions is clamped to 0..1 (Jimenez 2012 section 8.2).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub wrinkles: BTreeMap<String, f32>,
     /// Weight of each hemoglobin distribution by name, 0 or more, at most 1 together; the neutral one has the rest
-    /// (papers/004 eq. 7.6: weights sum to one).
+    /// (Jimenez 2012 eq. 7.6: weights sum to one).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub hemoglobin: BTreeMap<String, f32>,
-    /// Global factor of hemoglobin at full weight; 1 changes nothing (papers/004 section 7.7: anger 1.27, fear 0.81).
+    /// Global factor of hemoglobin at full weight; 1 changes nothing (Jimenez 2012 section 7.7: anger 1.27, fear 0.81).
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub hemoglobin_scale: f32,
 }

@@ -11,11 +11,11 @@ pub struct FaceState {
     /// Weight of each of [`Head::shapes`], combinations and in-betweens included. 0 to 1, and beyond where the
     /// track of a single shape goes there.
     pub shapes: Vec<f32>,
-    /// Weight of each of `maps.zones`, 0 to 1: already summed over expressions and clamped (papers/004 section 8.2).
+    /// Weight of each of `maps.zones`, 0 to 1: already summed over expressions and clamped (Jimenez 2012 section 8.2).
     pub zones: Vec<f32>,
     /// Weight of each of `maps.distributions`; the neutral distribution has the rest, `1 - sum`.
     pub distributions: Vec<f32>,
-    /// Global factor of hemoglobin (papers/004 section 7.7: 1.27 for anger, 0.81 for fear); 1 is neutral.
+    /// Global factor of hemoglobin (Jimenez 2012 section 7.7: 1.27 for anger, 0.81 for fear); 1 is neutral.
     pub hemoglobin_scale: f32,
     /// Diameter of the pupils, millimetres.
     pub pupil_mm: f32,

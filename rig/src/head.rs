@@ -172,11 +172,11 @@ impl OcclusionChange {
 /// The maps of a head, all in its texture space. Each is optional; a missing map has no effect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SkinMaps {
-    /// Melanin volume fraction of the epidermis, 0 to 0.5 (papers/004 table 7.1), 1 channel.
+    /// Melanin volume fraction of the epidermis, 0 to 0.5 (Jimenez 2012 table 7.1), 1 channel.
     pub melanin: Option<Map>,
     /// Hemoglobin volume fraction of the dermis in the neutral state, 0 to 0.32, 1 channel: `H_n`.
     pub hemoglobin: Option<Map>,
-    /// Local mean of the neutral hemoglobin, `mu_n` of papers/004 eq. 7.3, with the disk that the distributions were
+    /// Local mean of the neutral hemoglobin, `mu_n` of Jimenez 2012 eq. 7.3, with the disk that the distributions were
     /// measured with; 1 channel, low resolution. Needed where there are distributions.
     pub hemoglobin_mean: Option<Map>,
     /// Hemoglobin distributions of expressions and conditions; the neutral one is implied.
@@ -197,7 +197,7 @@ pub struct SkinMaps {
     pub hair_color_linear: [f32; 3],
 }
 
-/// A target hemoglobin distribution as local statistics (papers/004 eq. 7.5), low resolution.
+/// A target hemoglobin distribution as local statistics (Jimenez 2012 eq. 7.5), low resolution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Distribution {
     /// Such as `joy`, `anger`, `exercise`, `alcohol`.
@@ -208,7 +208,7 @@ pub struct Distribution {
     pub bias: Map,
 }
 
-/// A wrinkle zone (papers/004 section 8.2).
+/// A wrinkle zone (Jimenez 2012 section 8.2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct WrinkleZone {
     /// Such as `forehead-left`.

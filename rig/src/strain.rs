@@ -1,7 +1,7 @@
 //! Surface strain of blend shapes, and a prediction of blood and wrinkles where there are no measurements.
 //!
 //! A triangle's deformation gradient F maps its rest plane to the deformed one; C = F^T F has the squared principal
-//! stretches. Skin that is compressed drains (papers/004 section 7.3.1, observation 2) and folds across the direction
+//! stretches. Skin that is compressed drains (Jimenez 2012 section 7.3.1, observation 2) and folds across the direction
 //! of compression. The thesis gives no prediction; the linear model here is labelled as predicted and its
 //! coefficients are named fields.
 

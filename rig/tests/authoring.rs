@@ -11,7 +11,7 @@ use rubor_rig::names::ARKIT;
 use rubor_rig::timeline::{Ease, LightKind, Sequence, Track, sequence_schema};
 use std::io::Write;
 
-/// Zones of papers/004 table 8.1 in the order of its columns.
+/// Zones of Jimenez 2012 table 8.1 in the order of its columns.
 const TABLE_ZONES: [&str; 8] = [
     "forehead-outer-right",
     "forehead-outer-left",
@@ -22,7 +22,7 @@ const TABLE_ZONES: [&str; 8] = [
     "glabella",
     "chin",
 ];
-/// papers/004 table 8.1.
+/// Jimenez 2012 table 8.1.
 const TABLE: [(&str, [f32; 8]); 6] = [
     ("joy", [1.0, 1.0, 0.2, 0.2, 0.0, 0.0, 0.0, 0.0]),
     ("surprise", [0.8, 0.8, 0.8, 0.8, 0.0, 0.0, 0.0, 0.0]),

@@ -1,4 +1,4 @@
-//! Measured hemoglobin maps into distributions (papers/004 section 7.4, equations 7.1 and 7.5).
+//! Measured hemoglobin maps into distributions (Jimenez 2012 section 7.4, equations 7.1 and 7.5).
 //!
 //! A manifest (or the same fields by arguments) names a neutral map and any number of others. Numbers become volume
 //! fractions by unit and calibration; texels outside the mask never mix with skin. With a head, its skin is a mask

@@ -1,7 +1,7 @@
 //! Converted maps into a head, with what follows from them.
 //!
 //! Distributions are relative to the neutral blood of a head. Where new maps replace that blood, the distributions
-//! that stay follow it by ratio (section 7.4.2 of papers/004: only relative changes belong to an expression), and the
+//! that stay follow it by ratio (section 7.4.2 of Jimenez 2012: only relative changes belong to an expression), and the
 //! local mean that they stand on is taken anew.
 
 use rubor_rig::head::{Distribution, Head, Provenance, ProvenanceKind, WrinkleZone};

@@ -1,4 +1,4 @@
-//! Normal maps, partial derivative slopes and difference maps (papers/004 sections 8.2 and 8.2.1).
+//! Normal maps, partial derivative slopes and difference maps (Jimenez 2012 sections 8.2 and 8.2.1).
 //!
 //! Slopes are (n_x / n_z, n_y / n_z) with y towards -v (up), as [`rubor_rig::head::SkinMaps`] holds them; they add like
 //! displacements. Stored in 8 bits with a fixed range of 1 they cannot pass 45 degrees, so every encoding here carries

@@ -1,4 +1,4 @@
-//! The hemoglobin changes of one head on another (papers/004 section 7.4.2: appearance transfer).
+//! The hemoglobin changes of one head on another (Jimenez 2012 section 7.4.2: appearance transfer).
 //!
 //! Only relative, low-frequency statistics move: `scale` as it is, `bias` relative to the local mean of the blood.
 //! The vessels of the receiving head stay its own. Texture layouts are joined by a warp from the receiver's texture

@@ -67,7 +67,7 @@ pub fn bake(head: &Head, face: Option<&FaceState>, side: u32, factor: f32) -> Op
     RgbImage::from_raw(side, side, texels)
 }
 
-/// Slopes of the skin with the wrinkles of a face: zones summed and clamped as in papers/004 section 8.2.
+/// Slopes of the skin with the wrinkles of a face: zones summed and clamped as in Jimenez 2012 section 8.2.
 pub fn bake_slopes(head: &Head, face: &FaceState) -> Option<Map> {
     let maps = &head.maps;
     let active: Vec<_> = maps.zones.iter().zip(&face.zones).filter(|(_, w)| **w > 0.0).collect();

@@ -1,6 +1,6 @@
 //! Hemoglobin of expressions and conditions, as local statistics.
 //!
-//! A full map of each state is made from the neutral one and reduced to mean and deviation (papers/004 eq. 7.1, 7.5).
+//! A full map of each state is made from the neutral one and reduced to mean and deviation (Jimenez 2012 eq. 7.1, 7.5).
 //! The rules follow the findings of section 7.3.1: blood leaves compressed skin and gathers elsewhere (over the cheek
 //! bones in a smile); the pattern of a person's vessels stays and only its strength changes; exercise and alcohol
 //! have different patterns, neither is the neutral map times a number. Changes are relative to neutral and differ a

@@ -11,7 +11,7 @@
 //! All of it follows from the head, the options and the seed; the number of threads has no influence.
 //!
 //! Limits: nothing here is measured from a person. The distributions of expressions follow the findings
-//! of papers/004 section 7.3.1, not their data.
+//! of Jimenez 2012 section 7.3.1, not their data.
 
 mod brows;
 mod chromophores;
@@ -41,11 +41,11 @@ pub use strands::grow_lashes;
 use surface::SkinSurface;
 use wrinkles::Wrinkles;
 
-/// Side of the maps of hemoglobin distributions, texels (papers/004 section 7.6).
+/// Side of the maps of hemoglobin distributions, texels (Jimenez 2012 section 7.6).
 pub const DISTRIBUTION_RESOLUTION: u32 = 256;
 /// Side of the maps that local statistics are taken on, texels: they need many values, not their neighbourhood.
 const STATISTICS_RESOLUTION: u32 = 512;
-/// Radius of the disc of local statistics (papers/004 eq. 7.1), mm on the front of the face.
+/// Radius of the disc of local statistics (Jimenez 2012 eq. 7.1), mm on the front of the face.
 const STATISTICS_RADIUS_MM: f32 = 8.0;
 /// Side of zone masks, texels.
 pub const MASK_RESOLUTION: u32 = 128;

@@ -1,7 +1,7 @@
 //! Specular reflection by region.
 //!
 //! Weyrich et al. (2006) measured ten regions of 149 faces. Roughnesses are Beckmann m about the middle of what d'Eon and
-//! Luebke's specular map spans with them (papers/002 section 5: m = 0.23 + 0.09 w), widened on the T-zone and where skin
+//! Luebke's specular map spans with them (Lee, "Realistic Skin Rendering" section 5: m = 0.23 + 0.09 w), widened on the T-zone and where skin
 //! is wet; regions keep the measured order: nose, forehead and lips shine most, jaw and neck least. Intensities scale the
 //! Fresnel reflectance of a clean surface (1 would be one of eta 1.4 without pores or hair); d'Eon and Luebke's are about
 //! half of ours and look powdered under one lamp.

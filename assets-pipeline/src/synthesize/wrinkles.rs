@@ -360,7 +360,7 @@ pub(crate) fn zone_weights(place: Vec3) -> [f32; 12] {
         * smoothstep(4.0, -6.0, above_hairline(p))
         * smoothstep(72.0, 56.0, s)
         * (1.0 - glabella);
-    // The outer zones are the temples and the ends of the brows: a smile, which moves them fully (papers/004 table
+    // The outer zones are the temples and the ends of the brows: a smile, which moves them fully (Jimenez 2012 table
     // 8.1), must not fold the middle of the forehead.
     let outer = smoothstep(40.0, 54.0, s);
     let nose = smoothstep(19.5, 15.0, s)

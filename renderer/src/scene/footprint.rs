@@ -8,7 +8,7 @@ use rubor_rig::head::SkinMaps;
 use rubor_rig::map::Map;
 use serde::Serialize;
 
-/// Side of the maps that are blended for each frame (256 in papers/004 section 7.6).
+/// Side of the maps that are blended for each frame (256 in Jimenez 2012 section 7.6).
 pub(crate) const APPEARANCE_SIZE: u32 = 256;
 
 /// The size that holds all of some maps: at least one texel.
@@ -77,7 +77,7 @@ pub fn of_maps(maps: &SkinMaps) -> Vec<Footprint> {
     ]
 }
 
-/// Texels of the textures of zone masks: their own, which is little (64 x 64 in papers/004 section 8.3).
+/// Texels of the textures of zone masks: their own, which is little (64 x 64 in Jimenez 2012 section 8.3).
 pub(crate) fn mask_size(maps: &SkinMaps) -> [u32; 2] {
     largest_of(maps.zones.iter().map(|z| &z.mask))
 }

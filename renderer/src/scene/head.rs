@@ -16,9 +16,9 @@ use crate::device::texture::{self, Texel};
 use crate::device::{Bind, Gpu};
 use crate::error::RenderError;
 
-/// Largest melanin fraction of the skin colour table (papers/004 table 7.1).
+/// Largest melanin fraction of the skin colour table (Jimenez 2012 table 7.1).
 pub const MAX_MELANIN: f32 = 0.5;
-/// Largest hemoglobin fraction of the skin colour table (papers/004 table 7.1).
+/// Largest hemoglobin fraction of the skin colour table (Jimenez 2012 table 7.1).
 pub const MAX_HEMOGLOBIN: f32 = 0.32;
 /// Wrinkle maps that one head can have: one weight per channel of four layers.
 pub const MAX_WRINKLE_MAPS: usize = 16;
@@ -32,7 +32,7 @@ pub const MAX_ZONES: usize = 64;
 pub(crate) const AUTHORED_SHIFT: u32 = 8;
 
 /// Skin colour as a function of chromophores: columns are the cube root of melanin / 0.5, rows the cube root of
-/// hemoglobin / 0.32 (papers/004 eq. 7.7); the first and last texel stand at 0 and 1.
+/// hemoglobin / 0.32 (Jimenez 2012 eq. 7.7); the first and last texel stand at 0 and 1.
 pub struct ColorTable<'a> {
     /// Columns.
     pub width: u32,

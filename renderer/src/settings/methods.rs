@@ -322,46 +322,46 @@ groups! {
         None, "none", Nowhere, "";
         /// Two passes of one kernel of N taps that follows the surface.
         Separable(n: Number::every(2, 5, 65, None, "taps")), "separable", AfterShading,
-            "Jimenez et al. 2015; papers/004 ch. 6";
+            "Jimenez et al. 2015; Jimenez 2012 ch. 6";
         /// Four or six Gaussians one after the other, wide ones on smaller images.
-        ScreenGauss(n: Number::every(2, 4, 6, None, "Gaussians")), "screen-gauss", AfterShading, "papers/004 ch. 4";
+        ScreenGauss(n: Number::every(2, 4, 6, None, "Gaussians")), "screen-gauss", AfterShading, "Jimenez 2012 ch. 4";
         /// Thirteen jittered taps in one pass.
-        ScreenJitter, "screen-jitter", AfterShading, "Hable, Borshukov and Hejl 2009; papers/004 ch. 4";
+        ScreenJitter, "screen-jitter", AfterShading, "Hable, Borshukov and Hejl 2009; Jimenez 2012 ch. 4";
         /// N importance-sampled taps of normalized diffusion in one pass.
         BurleyDisk(n: Number::any(4, 256, None, "taps")), "burley-disk", AfterShading, "Golubev 2018";
         /// The profile itself as a kernel in two dimensions, over all pixels that it reaches.
-        ReferenceScreen, "reference-screen", AfterShading, "papers/004 eq. 3.2";
+        ReferenceScreen, "reference-screen", AfterShading, "Jimenez 2012 eq. 3.2";
         /// The integral of the profile over the deformed surface, with N times 65 536 samples.
         ReferenceSurface(n: Number::any(1, 4096, Some(64), "batches of 65 536 samples")), "reference-surface",
-            Reference, "Jensen et al. 2001; papers/004 eq. 5.1";
+            Reference, "Jensen et al. 2001; Jimenez 2012 eq. 5.1";
     }
     /// How light passes through thin parts.
     TransmitMethod, "transmit", "Light through thin parts" {
         /// None comes through.
         None, "none", Nowhere, "";
         /// Thickness from shadow maps, light from the integral of the profile over what the lamp shines on.
-        ShadowDepth, "shadow-depth", Shading, "Jimenez et al. 2010; papers/004 ch. 5";
+        ShadowDepth, "shadow-depth", Shading, "Jimenez et al. 2010; Jimenez 2012 ch. 5";
     }
     /// Whether the blood of a face moves.
     ColorMethod, "color", "Colour of skin" {
         /// The neutral hemoglobin map, whatever the face does.
         Static, "static", Nowhere, "";
         /// Hemoglobin distributions blended by their weights.
-        Hemoglobin, "hemoglobin", Shading, "papers/004 eq. 7.6";
+        Hemoglobin, "hemoglobin", Shading, "Jimenez 2012 eq. 7.6";
     }
     /// How wrinkles join the relief of the skin.
     WrinkleMethod, "wrinkles", "Wrinkles" {
         /// No wrinkles.
         None, "none", Nowhere, "";
         /// Slopes of wrinkles add to those of the skin: exact for height fields, with any number of maps.
-        PartialDerivative, "partial-derivative", Shading, "papers/004 section 8.2";
+        PartialDerivative, "partial-derivative", Shading, "Jimenez 2012 section 8.2";
         /// Differences of unit normals add to the normal of the skin, which is then normalised again.
-        Difference, "difference", Shading, "papers/004 section 8.2.1";
+        Difference, "difference", Shading, "Jimenez 2012 section 8.2.1";
     }
     /// The highlight of skin.
     SpecularMethod, "specular", "Highlights of skin" {
         /// A Beckmann lobe of the roughness in the map.
-        OneLobe, "one-lobe", Shading, "Kelemen and Szirmay-Kalos 2001; papers/002";
+        OneLobe, "one-lobe", Shading, "Kelemen and Szirmay-Kalos 2001; Lee, Realistic Skin Rendering";
         /// A sharp and a broad lobe with the mean square slope of the one lobe.
         TwoLobes, "two-lobes", Shading, "Graham et al. 2013";
     }
@@ -370,15 +370,15 @@ groups! {
         /// Edges stay stairs.
         None, "none", Nowhere, "";
         /// Practical morphological antialiasing.
-        Mlaa, "mlaa", Picture, "papers/004 ch. 9";
+        Mlaa, "mlaa", Picture, "Jimenez 2012 ch. 9";
         /// One sample per pixel, with diagonals and corners.
-        Smaa1x, "smaa-1x", Picture, "papers/004 ch. 10";
+        Smaa1x, "smaa-1x", Picture, "Jimenez 2012 ch. 10";
         /// One sample per pixel at alternating places, and the reprojected previous frame.
-        SmaaT2x, "smaa-t2x", Picture, "papers/004 section 10.3.3";
+        SmaaT2x, "smaa-t2x", Picture, "Jimenez 2012 section 10.3.3";
         /// Two samples per pixel, each filtered for its own place in the pixel.
-        SmaaS2x, "smaa-s2x", Picture, "papers/004 section 10.3.2";
+        SmaaS2x, "smaa-s2x", Picture, "Jimenez 2012 section 10.3.2";
         /// Two samples per pixel at alternating places, and the reprojected previous frame.
-        Smaa4x, "smaa-4x", Picture, "papers/004 section 10.3.4";
+        Smaa4x, "smaa-4x", Picture, "Jimenez 2012 section 10.3.4";
         /// N x N samples per pixel, each lit and tone mapped: the reference.
         Ssaa(n: Number::any(1, 8, None, "samples on a side of a pixel")), "ssaa", Picture, "supersampling";
     }
@@ -387,7 +387,7 @@ groups! {
         /// Radiance above 1 is white, nothing else changes: for comparisons with other programs.
         Linear, "linear", Picture, "IEC 61966-2-1";
         /// Shoulder, toe and linear part as one rational function; 4 becomes white.
-        Filmic, "filmic", Picture, "Hable 2010; papers/004 section 8.3 and ch. 11";
+        Filmic, "filmic", Picture, "Hable 2010; Jimenez 2012 section 8.3 and ch. 11";
     }
 }
 

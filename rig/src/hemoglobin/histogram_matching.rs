@@ -1,4 +1,4 @@
-//! Exact local histogram matching: the mapping that scale and bias approximate by Gaussians (papers/004 section 7.4).
+//! Exact local histogram matching: the mapping that scale and bias approximate by Gaussians (Jimenez 2012 section 7.4).
 //!
 //! For every texel the cumulative histograms of the neutral and of the target map in its disk are updated by sliding:
 //! a step along a row adds one edge of the disk and removes the other. Values have 16 bits; the inverse of a tie

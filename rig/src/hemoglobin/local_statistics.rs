@@ -1,4 +1,4 @@
-//! Mean and standard deviation in a disk around every texel (papers/004 eq. 7.1), exactly.
+//! Mean and standard deviation in a disk around every texel (Jimenez 2012 eq. 7.1), exactly.
 //!
 //! ```text
 //! f32 values --fixed point, 25 bits--> prefix sums of (q, count) packed and of q^2 (u64, wrapping), along rows and columns

@@ -1,4 +1,4 @@
-//! Hemoglobin distributions: how the blood of a face moves (papers/004 section 7.4).
+//! Hemoglobin distributions: how the blood of a face moves (Jimenez 2012 section 7.4).
 //!
 //! ```text
 //! neutral map H_n ----local_statistics--> mu_n, sigma_n --+
@@ -33,7 +33,7 @@ pub const MAX_SCALE: f32 = 100.0;
 /// Regularisation of the scale relative to the neutral mean.
 const RELATIVE_FLOOR: f64 = 1e-8;
 
-/// Side of a distribution map unless asked otherwise, texels (papers/004 section 7.6).
+/// Side of a distribution map unless asked otherwise, texels (Jimenez 2012 section 7.6).
 pub const DISTRIBUTION_SIZE: u32 = 256;
 
 /// Input that the hemoglobin model cannot use.
@@ -75,7 +75,7 @@ fn check_map(name: &str, map: &Map, mask: &Mask) -> Result<(), HemoglobinError> 
     }
 }
 
-/// `scale` and `bias` (papers/004 eq. 7.5) at full resolution, and where both maps have data.
+/// `scale` and `bias` (Jimenez 2012 eq. 7.5) at full resolution, and where both maps have data.
 ///
 /// # Errors
 /// Statistics of different sizes.

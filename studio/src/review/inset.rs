@@ -1,4 +1,4 @@
-//! A small map of the current state in a corner of a frame, as in the figures of papers/004 chapter 7.
+//! A small map of the current state in a corner of a frame, as in the figures of Jimenez 2012 chapter 7.
 
 use clap::ValueEnum;
 use glam::Vec2;

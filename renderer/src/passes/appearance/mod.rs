@@ -5,7 +5,7 @@
 //! zone masks, weights ------------------+              > wrinkles (weight of each wrinkle map, 0 to 1; four per layer)
 //! ```
 //!
-//! Theory: papers/004 eq. 7.6 and section 8.2. Eq. 7.6 is written as changes of the neutral,
+//! Theory: Jimenez 2012 eq. 7.6 and section 8.2. Eq. 7.6 is written as changes of the neutral,
 //! `H = H_n + sum_i w_i (bias_i - mu_n) + (sum_i w_i (scale_i - 1)) (H_n - mu_n)`, which is the same for weights that
 //! sum to one with the neutral and gives the neutral map exactly when all weights are zero.
 //!

@@ -5,7 +5,7 @@
 //! scattered, albedo, direct, depth --compose--> hdr (linear Rec. 709 radiance; a = coverage)
 //! ```
 //!
-//! Theory: post-scatter texturing (d'Eon and Luebke 2007; papers/004 section 7.6): measured albedo already holds the
+//! Theory: post-scatter texturing (d'Eon and Luebke 2007; Jimenez 2012 section 7.6): measured albedo already holds the
 //! blur of scattering, so it multiplies after the blur.
 
 #[cfg(test)]

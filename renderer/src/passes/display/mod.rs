@@ -4,7 +4,7 @@
 //! hdr --display--> image (rgba8unorm, sRGB transfer, opaque)
 //! ```
 //!
-//! Theory: exposure, the filmic curve of Hable 2010 (papers/004 section 8.3 and ch. 11: "really crisp blacks") or none,
+//! Theory: exposure, the filmic curve of Hable 2010 (Jimenez 2012 section 8.3 and ch. 11: "really crisp blacks") or none,
 //! IEC 61966-2-1 transfer.
 
 #[cfg(test)]

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! Theory: barycentrics and their screen derivatives from ray-plane volumes (exact under perspective); wrinkles as
-//! partial-derivative normals or as differences of normals (papers/004 sections 8.2 and 8.2.1); hemoglobin and skin colour (section 7.6); Kelemen and
-//! Szirmay-Kalos specular with the Beckmann distribution (papers/002, papers/004); percentage-closer soft shadows;
+//! partial-derivative normals or as differences of normals (Jimenez 2012 sections 8.2 and 8.2.1); hemoglobin and skin colour (section 7.6); Kelemen and
+//! Szirmay-Kalos specular with the Beckmann distribution (Lee, "Realistic Skin Rendering", Jimenez 2012); percentage-closer soft shadows;
 //! order-2 spherical harmonics and a prefiltered map for the environment; multiple-bounce ambient occlusion.
 //!
 //! The diffuse light of a lamp enters after the specular lobe has taken its share, and leaves towards the viewer in the
@@ -32,7 +32,7 @@
 //! Differs from the sources: slope variance lost by minification widens the Beckmann lobe (Toksvig 2005), and so
 //! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
 //!
-//! Transmittance (papers/004 ch. 5): light through thin parts from shadow maps and T(s), added to the diffuse light that
+//! Transmittance (Jimenez 2012 ch. 5): light through thin parts from shadow maps and T(s), added to the diffuse light that
 //! is scattered next. Differs from the source: it sums the profile over the lit surface around the light's ray, the
 //! integral of eq. 5.8 with the surface in the shadow map, so tilt, thickness and the edges of thin parts need
 //! no guess (no reversed normal, no 0.3 wrap, no shrinking); light on the visible surface is left to `diffusion`. Lamps

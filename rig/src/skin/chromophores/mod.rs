@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Theory and source: Donner and Jensen 2006 (spectra and layers), Jimenez et al. 2010 (parameters, look-up;
-//! papers/004 section 7.6). What differs: reflectance comes from the radiative transfer equation by discrete ordinates
+//! Jimenez 2012 section 7.6). What differs: reflectance comes from the radiative transfer equation by discrete ordinates
 //! instead of the multipole, which is exact also where absorption is as strong as scattering (dark skin, blue light);
 //! a thin horny layer without melanin lies on the epidermis; without it dark skin is too orange.
 //!
@@ -38,9 +38,9 @@ use coefficients::{dermis, epidermis, stratum_corneum};
 use layers::{Directions, HalfSpace};
 use spectra::{D65, FIRST_NM, OBSERVER, OBSERVER_STEP_NM};
 
-/// Largest melanin volume fraction of the epidermis (papers/004 table 7.1).
+/// Largest melanin volume fraction of the epidermis (Jimenez 2012 table 7.1).
 pub const MAX_MELANIN: f64 = 0.5;
-/// Largest hemoglobin volume fraction of the dermis (papers/004 table 7.1).
+/// Largest hemoglobin volume fraction of the dermis (Jimenez 2012 table 7.1).
 pub const MAX_HEMOGLOBIN: f64 = 0.32;
 
 /// Constants of skin that do not come from a map.
@@ -64,7 +64,7 @@ pub struct ChromophoreModel {
 }
 
 impl Default for ChromophoreModel {
-    /// Donner and Jensen 2006 with the blends of papers/004 figure 7.9, but for the thicknesses: 0.012 mm of horny layer
+    /// Donner and Jensen 2006 with the blends of Jimenez 2012 figure 7.9, but for the thicknesses: 0.012 mm of horny layer
     /// without melanin on 0.05 mm of living epidermis, as on the face (0.01 and 0.04 to 0.1 mm in histology), not
     /// 0.25 mm with melanin throughout. Chosen on the twenty colours of [`published`]: mean CIEDE2000 1.3 (0.7 for the
     /// measured means of Xiao et al. 2017). At 0.25 mm those lie 3.4 away: so thick a layer without much blood returns
@@ -83,7 +83,7 @@ impl Default for ChromophoreModel {
     }
 }
 
-/// Address in the look-up of volume fractions, clamped to 0..1 (papers/004 eq. 7.7, scaled to the ranges of table 7.1).
+/// Address in the look-up of volume fractions, clamped to 0..1 (Jimenez 2012 eq. 7.7, scaled to the ranges of table 7.1).
 pub fn lookup_address(melanin: f64, hemoglobin: f64) -> [f64; 2] {
     [(melanin / MAX_MELANIN).clamp(0.0, 1.0).cbrt(), (hemoglobin / MAX_HEMOGLOBIN).clamp(0.0, 1.0).cbrt()]
 }
@@ -261,7 +261,7 @@ impl SkinModel {
     }
 }
 
-/// The skin colour table of papers/004 figure 7.9: melanin along x, hemoglobin along y, cube-root axes.
+/// The skin colour table of Jimenez 2012 figure 7.9: melanin along x, hemoglobin along y, cube-root axes.
 ///
 /// Texel (x, y) stands at `u = x / (width - 1)`, `v = y / (height - 1)`: the first and last texels are the ends of the
 /// ranges, so a sampler addresses the texture at `(u * (width - 1) + 0.5) / width`.

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Theory: radiant exitance is the integral of R(|x - y|) E(y) over the surface (Jensen et al. 2001 with a diffusion
-//! profile; papers/004 eq. 5.1 without the plane). E uses the frame's own lights, shadows and maps and includes light
+//! profile; Jimenez 2012 eq. 5.1 without the plane). E uses the frame's own lights, shadows and maps and includes light
 //! that arrives from behind, across gaps or around edges, so frames with this method use no transmittance.
 //!
 //! Within a radius of a millimetre the surface counts as flat: there the integral is the light of a disk times E(x),

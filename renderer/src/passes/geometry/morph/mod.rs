@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Theory: linear blend shapes, `p = world_from_head (rest + sum_i w_i offset_i)` (Lewis et al. 2014, "Practice and
-//! theory of blendshape facial models"). The thesis streams shapes out pass by pass (papers/004 section 7.6); here
+//! theory of blendshape facial models"). The thesis streams shapes out pass by pass (Jimenez 2012 section 7.6); here
 //! one dispatch gathers, point by point, only the shapes that move the point.
 //!
 //! Ambient visibility uses the same weights: the changes of a shape at 0.5 and 1 were traced at import

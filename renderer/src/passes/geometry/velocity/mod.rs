@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Theory: the point that a pixel sees keeps its barycentric coordinates, so its previous place is known exactly:
-//! morphs, head motion and camera are all contained in the two sets of positions and matrices (papers/004 section
+//! morphs, head motion and camera are all contained in the two sets of positions and matrices (Jimenez 2012 section
 //! 10.3.3).
 //!
 //! Hair and lashes mix their own motion in afterwards (see `cropped_hair` and `overlay`).

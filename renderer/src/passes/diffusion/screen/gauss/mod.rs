@@ -1,4 +1,4 @@
-//! `screen-gauss:4`, `screen-gauss:6`: Gaussians one after the other (papers/004 ch. 4), wide ones on smaller images.
+//! `screen-gauss:4`, `screen-gauss:6`: Gaussians one after the other (Jimenez 2012 ch. 4), wide ones on smaller images.
 //!
 //! ```text
 //! irradiance --line, line--> G2 --line, line--> G3 ...      each blurs the one before by the difference in variance

@@ -1,4 +1,4 @@
-//! `screen-jitter`: thirteen jittered taps (Hable, Borshukov and Hejl 2009; papers/004 ch. 4, "SS Jittered").
+//! `screen-jitter`: thirteen jittered taps (Hable, Borshukov and Hejl 2009; Jimenez 2012 ch. 4, "SS Jittered").
 //!
 //! ```text
 //! irradiance, depth --one pass--> scattered
@@ -18,7 +18,7 @@ use crate::device::Gpu;
 use crate::device::wgsl::{Module, Program, module};
 
 /// Share of the widest channel's light inside of the middle and inside of the wide annulus: two fifths of skin's red
-/// scatters less than a millimetre, the rest is nearly all in its two widest Gaussians (papers/004 table 4.2).
+/// scatters less than a millimetre, the rest is nearly all in its two widest Gaussians (Jimenez 2012 table 4.2).
 const ANNULI: [f64; 2] = [0.35, 0.6];
 
 const SHADER: Module = module!("jitter", "jitter.wesl");

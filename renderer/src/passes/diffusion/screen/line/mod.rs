@@ -4,12 +4,12 @@
 //! source (rgb, a = depth), strength, depth --sampled along a line--> target [, sum of Gaussians]
 //! ```
 //!
-//! Theory: Jimenez et al. 2015; papers/004 ch. 6. The kernel is in millimetres on the surface and is projected with the
+//! Theory: Jimenez et al. 2015; Jimenez 2012 ch. 6. The kernel is in millimetres on the surface and is projected with the
 //! depth and field of view of each pixel; the kernel follows the surface: the light of a neighbour off the tangent
 //! plane of the centre is replaced by that of the centre.
 //!
 //! Differs from the source: it compares a neighbour with the tangent plane and not with the depth of the centre, so a
-//! tilted cheek keeps its whole kernel, and shortens the kernel with the tilt (papers/004 eqs. 4.1 and 4.2, with the
+//! tilted cheek keeps its whole kernel, and shortens the kernel with the tilt (Jimenez 2012 eqs. 4.1 and 4.2, with the
 //! cosine instead of tuned constants). A tap is one bilinear sample of light and depth together; only where it is
 //! off the plane, and may be a mixture of two surfaces, two texels are read and weighted by their own depths.
 //!

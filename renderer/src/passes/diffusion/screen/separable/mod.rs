@@ -1,4 +1,4 @@
-//! `separable:N`: two passes of one kernel of N taps (Jimenez et al. 2015; papers/004 ch. 6).
+//! `separable:N`: two passes of one kernel of N taps (Jimenez et al. 2015; Jimenez 2012 ch. 6).
 //!
 //! ```text
 //! irradiance --line, horizontal--> scratch --line, vertical--> scattered
