@@ -6,23 +6,8 @@ use std::time::Instant;
 
 use rubor_assets::import::capture::{Recording, Retarget, json, live_link, to_sequence};
 use rubor_rig::names::ARKIT;
+use rubor_rig::random::SplitMix64;
 use rubor_rig::timeline::Sequence;
-
-/// A small generator of reproducible noise (SplitMix64).
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end.max(1) as u64) as usize
-    }
-}
 
 /// Weight of jawOpen in a sample: a line, so that every place of it is known by its value.
 fn jaw(sample: usize) -> f32 {
@@ -605,7 +590,7 @@ fn mutated_recordings_end_in_a_take_or_an_error_in_bounded_time() {
     let hostile =
         ["50000000", "-1", "1e300", "nan", "1e-320", ";", ",", "\"", "00:00:59;29", "{", "]", "\t", "null"];
     let seeds: Vec<Input> = cases().into_iter().map(|c| c.input).collect();
-    let mut noise = Noise(14);
+    let mut noise = SplitMix64(14);
     let (mut read, mut refused, mut slowest) = (0, 0, 0.0_f64);
     for round in 0..rounds {
         let seed = &seeds[round % seeds.len()];
@@ -619,7 +604,7 @@ fn mutated_recordings_end_in_a_take_or_an_error_in_bounded_time() {
             let at = noise.below(end);
             let to = (at + noise.below(300)).min(bytes.len());
             match noise.below(12) {
-                0 => bytes[at] = noise.next() as u8,
+                0 => bytes[at] = noise.bits() as u8,
                 1 => bytes.truncate(at.max(1)),
                 2 => {
                     let token = hostile[noise.below(hostile.len())].bytes();

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use rubor_assets::import::gltf::{from_bytes, lint};
 use rubor_assets::import::obj::{self, GroupBy};
 use rubor_assets::import::obj_set::{Options, read};
+use rubor_rig::random::SplitMix64;
 use serde_json::{Value, json};
 
 mod support;
@@ -22,29 +23,12 @@ fn count() -> u64 {
     std::env::var("RUBOR_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(300)
 }
 
-/// SplitMix64 (G. Steele et al. 2014).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n.max(1) as u64) as usize
-    }
-
-    fn pick<'a, T>(&mut self, list: &'a [T]) -> &'a T {
-        &list[self.below(list.len())]
-    }
+fn pick<'a, T>(list: &'a [T], random: &mut SplitMix64) -> &'a T {
+    &list[random.below(list.len())]
 }
 
 /// Flips, overwrites, repeats, removes and cuts bytes.
-fn mutate_bytes(bytes: &mut Vec<u8>, random: &mut Random) {
+fn mutate_bytes(bytes: &mut Vec<u8>, random: &mut SplitMix64) {
     for _ in 0..=random.below(4) {
         if bytes.is_empty() {
             return;
@@ -53,8 +37,8 @@ fn mutate_bytes(bytes: &mut Vec<u8>, random: &mut Random) {
         let end = (at + 1 + random.below(16)).min(bytes.len());
         match random.below(6) {
             0 => bytes[at] ^= 1 << random.below(8),
-            1 => bytes[at] = *random.pick(&[0, 1, 0x7f, 0x80, 0xff, b'0', b'-', b'/', b'\\', b'\n', b'\r']),
-            2 => bytes[at..end].fill(*random.pick(&[0, 0xff, b'9'])),
+            1 => bytes[at] = *pick(&[0, 1, 0x7f, 0x80, 0xff, b'0', b'-', b'/', b'\\', b'\n', b'\r'], random),
+            2 => bytes[at..end].fill(*pick(&[0, 0xff, b'9'], random)),
             3 => {
                 let copy = bytes[at..end].to_vec();
                 let to = random.below(bytes.len());
@@ -64,13 +48,13 @@ fn mutate_bytes(bytes: &mut Vec<u8>, random: &mut Random) {
                 bytes.drain(at..end);
             }
             _ if random.below(8) == 0 => bytes.truncate(at),
-            _ => bytes[at] = random.next() as u8,
+            _ => bytes[at] = random.bits() as u8,
         }
     }
 }
 
 /// Changes one value somewhere in a document.
-fn mutate_json(value: &mut Value, random: &mut Random) {
+fn mutate_json(value: &mut Value, random: &mut SplitMix64) {
     let inner = match value {
         Value::Object(map) => map.len(),
         Value::Array(list) => list.len(),
@@ -88,7 +72,7 @@ fn mutate_json(value: &mut Value, random: &mut Random) {
                     1 => {
                         let taken = map.remove(&key).unwrap_or_default();
                         map.insert(
-                            random.pick(&["node", "mesh", "path", "targets", "POSITION"]).to_string(),
+                            pick(&["node", "mesh", "path", "targets", "POSITION"], random).to_string(),
                             taken,
                         );
                     }
@@ -137,17 +121,17 @@ fn mutate_json(value: &mut Value, random: &mut Random) {
         json!(5121),
         json!(5126),
     ];
-    *value = random.pick(&others).clone();
+    *value = pick(&others, random).clone();
 }
 
 /// Runs a reader on mutations and collects those that panic or take too long.
-fn run(name: &str, seed: u64, mut once: impl FnMut(&mut Random)) {
+fn run(name: &str, seed: u64, mut once: impl FnMut(&mut SplitMix64)) {
     let mut faults = Vec::new();
     let mut slowest = Duration::ZERO;
     // The messages of caught panics say where they come from.
     for i in 0..count() {
         let start = Instant::now();
-        let mut random = Random(seed ^ i.wrapping_mul(0xd134_2543_de82_ef95));
+        let mut random = SplitMix64(seed ^ i.wrapping_mul(0xd134_2543_de82_ef95));
         if catch_unwind(AssertUnwindSafe(|| once(&mut random))).is_err() {
             faults.push(format!("mutation {i} panics"));
         }
@@ -274,13 +258,13 @@ fn obj_files() {
                         "#",
                         "l",
                     ];
-                    words[k] = random.pick(&other).to_string();
+                    words[k] = pick(&other, random).to_string();
                     lines[at] = words.join(" ");
                 }
             }
             bytes = lines.join("\n").into_bytes();
         }
-        let group_by = *random.pick(&[GroupBy::Group, GroupBy::Material]);
+        let group_by = *pick(&[GroupBy::Group, GroupBy::Material], random);
         if let Ok(file) = obj::from_bytes(&bytes, Path::new("mutated.obj"), group_by) {
             let mesh = &file.mesh;
             assert!(

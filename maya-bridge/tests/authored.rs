@@ -9,6 +9,7 @@ use glam::Vec3;
 use plate::{RISE, Scene, second_plate};
 use rubor_maya::error::ReadError;
 use rubor_maya::read::{self, Imported};
+use rubor_rig::random::SplitMix64;
 
 fn smile(imported: &Imported) -> Vec<(u32, f32)> {
     let shape = imported.head.shapes.iter().find(|s| s.name == "smile").unwrap();
@@ -707,14 +708,8 @@ fn mutated_scenes_end_in_a_head_or_an_error_in_bounded_time() {
         "2147483648",
     ];
     let seeds: Vec<Vec<u8>> = cases().into_iter().map(|c| c.bytes).filter(|b| b.len() < 100_000).collect();
-    let mut state = 14_u64;
-    // SplitMix64.
-    let mut next = |end: usize| {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % end.max(1) as u64) as usize
-    };
+    let mut random = SplitMix64(14);
+    let mut next = |end: usize| random.below(end);
     let (mut read, mut refused, mut slowest) = (0, 0, 0.0_f64);
     for round in 0..rounds {
         let mut bytes = seeds[round % seeds.len()].clone();

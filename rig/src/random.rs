@@ -18,6 +18,11 @@ impl SplitMix64 {
     pub fn uniform(&mut self) -> f64 {
         unit(self.bits())
     }
+
+    /// A whole number below `end`, nearly uniform where `end` is far below 2^64; 0 where `end` is 0.
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.bits() % end.max(1) as u64) as usize
+    }
 }
 
 /// The finaliser of [`SplitMix64`]: a bijection of 64 bits that looks random, for numbers by index.
@@ -42,6 +47,15 @@ mod tests {
         let mut random = SplitMix64(1_234_567);
         let found: [u64; 3] = std::array::from_fn(|_| random.bits());
         assert_eq!(found, [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423]);
+    }
+
+    #[test]
+    fn whole_numbers_fill_their_range() {
+        let mut random = SplitMix64(3);
+        let mut counts = [0; 7];
+        (0..7000).for_each(|_| counts[random.below(7)] += 1);
+        assert!(counts.iter().all(|n| (850..1150).contains(n)), "{counts:?}");
+        assert_eq!(random.below(0), 0);
     }
 
     #[test]

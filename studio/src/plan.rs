@@ -62,6 +62,11 @@ impl<'a> Plan<'a> {
                 list.numbers().iter().map(|n| n - 1).collect()
             }
         };
+        if sequence.lights.is_empty() && sequence.environment.is_none() {
+            let hint = "heads are black without lights and environment (`--lights three-point`, or \"environment\": \
+                        { \"name\": \"studio\" } in the sequence)";
+            notes.push(Note::new("sequence", hint));
+        }
         let spacing_m = heads.iter().map(|h| width(&h.head)).fold(0.0, f32::max) * SPACING;
         Ok(Self { job, heads, evaluators, frames, spacing_m, notes })
     }

@@ -6,6 +6,7 @@
 //! heads --------> animated_head.glb      job.json, stats.json
 //! ```
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -83,8 +84,7 @@ pub fn run(
     watch.notes(plan.notes());
     let (job, heads) = (plan.job(), plan.heads());
     let inset = job.inset.zip(heads.first()).map(|(map, head)| Inset::new(map, &head.head)).transpose()?;
-    output::folder(&to.folder)?;
-    let is_new = claim_folder(job, to)?;
+    let (is_new, mut to_write) = claim(job, to)?;
     let size = job.settings.output.size;
     plan.enter(studio)?;
 
@@ -125,9 +125,16 @@ pub fn run(
         sheet.extend(written.small.map(|small| (written.place, small)));
         watch.step();
     };
+    // With the first frame, so that a job that cannot be drawn leaves nothing.
+    let mut claim_folder = || -> Outcome {
+        let Some(job) = to_write.take() else { return Ok(()) };
+        output::folder(&to.folder)?;
+        job.write(&to.folder.join(JOB_FILE))
+    };
     writers::beside(&write, &mut written, |push| {
         let mut since = Instant::now();
         plan.draw(studio, &to_draw, |shown| {
+            claim_folder()?;
             seconds.push(since.elapsed().as_secs_f64());
             since = Instant::now();
             times.add(&shown.drawn.stats);
@@ -135,6 +142,7 @@ pub fn run(
             push(Page { place, shown })
         })
     })?;
+    claim_folder()?;
     watch.end();
 
     let of_surroundings = studio.take_notes();
@@ -180,13 +188,12 @@ pub fn run(
     Ok(report)
 }
 
-/// Writes the job into the folder. False if a stopped run of the same job is resumed: the folder then holds the
-/// frames of both.
-fn claim_folder(job: &Job, to: &Destination) -> Outcome<bool> {
+/// Whether all frames are new, and the job that the folder has to hold before the first of them. If a stopped run of the
+/// same job is resumed, it holds the frames of both.
+fn claim<'a>(job: &'a Job, to: &Destination) -> Outcome<(bool, Option<Cow<'a, Job>>)> {
     let path = to.folder.join(JOB_FILE);
     if !to.resume || !path.is_file() {
-        job.write(&path)?;
-        return Ok(true);
+        return Ok((true, Some(Cow::Borrowed(job))));
     }
     let before = Job::read(&path, None)?;
     if !before.draws_like(job)? {
@@ -198,10 +205,8 @@ fn claim_folder(job: &Job, to: &Destination) -> Outcome<bool> {
     }
     let both =
         before.frames.as_ref().zip(job.frames.as_ref()).map(|(a, b): (&FrameList, &FrameList)| a.and(b));
-    if both != before.frames {
-        Job { frames: both, ..job.clone() }.write(&path)?;
-    }
-    Ok(false)
+    let wider = (both != before.frames).then(|| Cow::Owned(Job { frames: both, ..job.clone() }));
+    Ok((false, wider))
 }
 
 /// The picture of a frame, from 0; files are numbered from 1.

@@ -183,6 +183,11 @@ impl FaceSpace {
         }
     }
 
+    /// Whether landmarks say where the face is, not the bounds of the head.
+    pub(crate) fn follows_landmarks(&self) -> bool {
+        !self.centres.is_empty()
+    }
+
     /// Canonical position (mm) of a rest position (m).
     pub(crate) fn warp(&self, position: Vec3) -> Vec3 {
         let p = (position * MM_PER_METRE).as_dvec3() - self.origin;

@@ -199,10 +199,13 @@ fn synthesize_with(
     if surface.is_empty() {
         return Err(SynthesizeError::NoSkin { head: head.name.clone() });
     }
+    let is_placed = space.follows_landmarks();
+    let without_hair = Options { brows: 0.0, stubble: 0.0, scalp_hair: 0.0, ..options.clone() };
+    let options = if is_placed { options } else { &without_hair };
     let seed = options.seed_bits();
     let chromophores = Chromophores::new(options);
     let wrinkles = Wrinkles::new(seed);
-    let lasting = lasting_lines(options.age_years);
+    let lasting = if is_placed { lasting_lines(options.age_years) } else { 0.0 };
 
     let half = surface.rasterise(options.half_resolution());
     let texel_mm = surface.texel_mm(half.resolution());
@@ -270,8 +273,8 @@ fn synthesize_with(
         hemoglobin_mean: Some(hemoglobin_mean),
         distributions,
         slopes,
-        wrinkle_slopes,
-        zones,
+        wrinkle_slopes: if is_placed { wrinkle_slopes } else { Vec::new() },
+        zones: if is_placed { zones } else { Vec::new() },
         specular,
         scattering,
         hair,
@@ -292,6 +295,12 @@ fn hair_color_linear(melanin: f32, grey: f32) -> [f32; 3] {
 /// Share of the expression wrinkles that stays on the face at rest.
 fn lasting_lines(age_years: f32) -> f32 {
     0.03 + 0.5 * noise::smoothstep(26.0, 85.0, age_years)
+}
+
+/// Whether a head has the landmarks that say where its face is. Without them no hair, brows and wrinkles are made: their
+/// places would be guesses.
+pub fn finds_face(head: &Head) -> bool {
+    FaceSpace::fit(head).follows_landmarks()
 }
 
 /// Provenance of maps made by [`synthesize`].

@@ -347,8 +347,13 @@ fn heads_without_landmarks_or_with_broken_triangles_get_maps() {
     head.landmarks.clear();
     head.mesh.vertices[5].uv = Vec2::new(7.0, -3.0);
     head.mesh.triangles[9] = [3, 3, 3];
+    assert!(!finds_face(&head));
     synthesize_into(&mut head, &options(256)).unwrap();
     head.validate().unwrap();
+    // Their places would be guesses.
+    assert!(head.maps.zones.is_empty() && head.maps.wrinkle_slopes.is_empty());
+    assert!(head.maps.hair.as_ref().unwrap().values.iter().all(|t| *t == 0.0));
+    assert!(!head.maps.distributions.is_empty());
 }
 
 #[test]

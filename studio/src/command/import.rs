@@ -272,6 +272,10 @@ pub(crate) fn finish_with(
             "no part is skin: no maps, brows and lashes are made (`--parts NAME=skin` makes a part skin)";
         console::notes(&[Note::new(path.display().to_string(), message)]);
     } else if head.maps.melanin.is_none() && common.maps > 0 {
+        if !synthesize::finds_face(&head) {
+            let message = "no landmarks say where the face is: skin gets no hair, brows and wrinkles";
+            console::notes(&[Note::new(path.display().to_string(), message)]);
+        }
         options.seed = common.seed.unwrap_or(options.seed);
         options.resolution = common.maps;
         options.melanin = common.melanin.unwrap_or(options.melanin);

@@ -1,6 +1,6 @@
 //! Materials of authors: the equation, energy, textures and holes.
 
-use glam::{DVec3, Mat4, Vec2, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 use rubor_rig::authored::{
     AlphaMode, AuthoredImage, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap,
 };
@@ -8,10 +8,9 @@ use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Head, Material};
 
 use super::reference::MetallicRoughness;
+use super::tests::largest_error;
 use crate::channels::Channel;
-use crate::tests::{
-    WHITE_TABLE, dome, read, read_texels, read_vectors, render, renderer, seen_surface, settings,
-};
+use crate::tests::{WHITE_TABLE, dome, read_texels, render, renderer, settings};
 use crate::{Camera, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
 const SIZE: u32 = 45;
@@ -70,35 +69,9 @@ fn a_lamp_on_it_is_the_equation() {
     };
     for direction in [Vec3::new(0.1, -0.2, -1.0), Vec3::new(-0.8, -0.5, -0.6), Vec3::new(0.9, 0.3, -0.4)] {
         let light = lamp(direction);
-        let hdr = draw(&mut renderer, &head, &[light], false);
-        let points = read_vectors(&renderer, Channel::Positions);
-        let frames: Vec<[f32; 7]> = read(&renderer, Channel::TangentFrames).texels().collect();
-        let ids: Vec<[f32; 1]> = read(&renderer, Channel::Ids).texels().collect();
-        let to_light = -direction.as_dvec3().normalize();
-        let (mut compared, mut largest) = (0, 0.0f64);
-        for (i, found) in hdr.iter().enumerate() {
-            let Some(hit) =
-                seen_surface(&head, &points, ids[i][0].to_bits(), &CAMERA, SIZE, i as u32, [0.0; 2])
-            else {
-                continue;
-            };
-            let normal_of = |k: usize| {
-                let f = frames[hit.vertices[k] as usize];
-                DVec3::new(f64::from(f[0]), f64::from(f[1]), f64::from(f[2]))
-            };
-            let normal = (0..3).map(|k| hit.barycentric[k] * normal_of(k)).sum::<DVec3>().normalize();
-            let to_viewer = (CAMERA.position.as_dvec3() - hit.position).normalize();
-            // Past the horizon the shader fades; there the equation has nothing to say.
-            if normal.dot(to_light) < 0.15 || normal.dot(to_viewer) < 0.15 {
-                continue;
-            }
-            compared += 1;
-            let radiance = expected.radiance(normal, to_light, to_viewer);
-            for c in 0..3 {
-                let irradiance = f64::from(light.color_linear[c]);
-                largest = largest.max((f64::from(found[c]) / irradiance - radiance).abs() / radiance);
-            }
-        }
+        draw(&mut renderer, &head, &[light], false);
+        let (compared, largest) =
+            largest_error(&renderer, &head, &CAMERA, SIZE, &light, |n, l, v| expected.radiance(n, l, v));
         // Halves keep 11 bits; the rest is f32 in a lobe whose slope multiplies errors of the half vector.
         assert!(compared > 200 && largest < 0.004, "{direction}: {compared} pixels, error up to {largest}");
     }

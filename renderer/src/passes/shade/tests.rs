@@ -106,6 +106,47 @@ fn lobes_keep_the_mean_square_slope() {
     }
 }
 
+/// Pixels of the square picture last drawn that were compared with the reflected radiance for irradiance 1 of a surface
+/// with a normal, towards a directional lamp and towards the viewer; and the largest relative error.
+pub(super) fn largest_error(
+    renderer: &Renderer,
+    head: &Head,
+    camera: &Camera,
+    size: u32,
+    lamp: &Light,
+    radiance: impl Fn(DVec3, DVec3, DVec3) -> f64,
+) -> (usize, f64) {
+    let LightKind::Directional { direction } = lamp.kind else { panic!("the lamp is directional") };
+    let to_light = -direction.as_dvec3().normalize();
+    let points = read_vectors(renderer, Channel::Positions);
+    let frames: Vec<[f32; 7]> = read(renderer, Channel::TangentFrames).texels().collect();
+    let ids: Vec<[f32; 1]> = read(renderer, Channel::Ids).texels().collect();
+    let (mut compared, mut largest) = (0, 0.0f64);
+    for (i, found) in read_texels(renderer, Channel::Radiance).iter().enumerate() {
+        let Some(hit) = seen_surface(head, &points, ids[i][0].to_bits(), camera, size, i as u32, [0.0; 2])
+        else {
+            continue;
+        };
+        let normal_of = |k: usize| {
+            let f = frames[hit.vertices[k] as usize];
+            DVec3::new(f64::from(f[0]), f64::from(f[1]), f64::from(f[2]))
+        };
+        let normal = (0..3).map(|k| hit.barycentric[k] * normal_of(k)).sum::<DVec3>().normalize();
+        let to_viewer = (camera.position.as_dvec3() - hit.position).normalize();
+        // Past the horizon the shader fades; the equation does not apply there.
+        if normal.dot(to_light) < 0.15 || normal.dot(to_viewer) < 0.15 {
+            continue;
+        }
+        compared += 1;
+        let expected = radiance(normal, to_light, to_viewer);
+        for c in 0..3 {
+            let irradiance = f64::from(lamp.color_linear[c]);
+            largest = largest.max((f64::from(found[c]) / irradiance - expected).abs() / expected);
+        }
+    }
+    (compared, largest)
+}
+
 #[test]
 fn a_lamp_on_bare_skin_is_the_equation() {
     let Some(mut renderer) = renderer() else { return };
@@ -137,36 +178,8 @@ fn a_lamp_on_bare_skin_is_the_equation() {
             background_linear: Vec3::ZERO,
         };
         render(&mut renderer, &scene, &settings).expect("it draws");
-        let points = read_vectors(&renderer, Channel::Positions);
-        let frames: Vec<[f32; 7]> = read(&renderer, Channel::TangentFrames).texels().collect();
-        let ids: Vec<[f32; 1]> = read(&renderer, Channel::Ids).texels().collect();
-        let hdr = read_texels(&renderer, Channel::Radiance);
-        let to_light = -direction.as_dvec3().normalize();
-        let (mut compared, mut largest) = (0, 0.0f64);
-        for (i, found) in hdr.iter().enumerate() {
-            let Some(hit) =
-                seen_surface(&head, &points, ids[i][0].to_bits(), &camera, size, i as u32, [0.0; 2])
-            else {
-                continue;
-            };
-            let normal_of = |k: usize| {
-                let f = frames[hit.vertices[k] as usize];
-                DVec3::new(f64::from(f[0]), f64::from(f[1]), f64::from(f[2]))
-            };
-            let normal = (0..3).map(|k| hit.barycentric[k] * normal_of(k)).sum::<DVec3>().normalize();
-            let to_viewer = (camera.position.as_dvec3() - hit.position).normalize();
-            // Past the horizon the shader fades; the equation does not apply there.
-            if normal.dot(to_light) < 0.15 || normal.dot(to_viewer) < 0.15 {
-                continue;
-            }
-            compared += 1;
-            let expected = skin.radiance(normal, to_light, to_viewer);
-            for c in 0..3 {
-                let irradiance = f64::from(lamp.color_linear[c]);
-                let error = (f64::from(found[c]) / irradiance - expected).abs() / expected;
-                largest = largest.max(error);
-            }
-        }
+        let (compared, largest) =
+            largest_error(&renderer, &head, &camera, size, &lamp, |n, l, v| skin.radiance(n, l, v));
         // The table of reflected shares is linear between 32 cosines and 32 roughnesses; halves keep 11 bits.
         assert!(compared > 200 && largest < 0.01, "{direction}: {compared} pixels, error up to {largest}");
     }
