@@ -11,40 +11,26 @@ use rubor_rig::head::{
     SkinMaps, Vertex, WrinkleZone,
 };
 use rubor_rig::map::Map;
+use rubor_rig::random::SplitMix64;
 use rubor_rig::timeline::{Ease, Key, Sequence, Track};
 
-/// A small generator of reproducible noise (SplitMix64).
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    fn signed(&mut self) -> f32 {
-        2.0 * self.unit() - 1.0
-    }
+/// -1 to 1.
+fn signed(noise: &mut SplitMix64) -> f32 {
+    (2.0 * noise.uniform() - 1.0) as f32
 }
 
 /// A grid of two parts whose vertices split along a seam, with awkward numbers everywhere.
 fn head() -> Head {
     const N: u32 = 12;
-    let mut noise = Noise(1);
+    let mut noise = SplitMix64(1);
     let mut mesh = Mesh::default();
     for y in 0..N {
         for x in 0..N {
             let scale = 0.2 / N as f32;
             mesh.points.push(Vec3::new(
-                x as f32 * scale + 1e-4 * noise.signed(),
-                y as f32 * scale + 1e-4 * noise.signed(),
-                0.1 * noise.signed() * 10.0_f32.powi(-((x % 7) as i32)),
+                x as f32 * scale + 1e-4 * signed(&mut noise),
+                y as f32 * scale + 1e-4 * signed(&mut noise),
+                0.1 * signed(&mut noise) * 10.0_f32.powi(-((x % 7) as i32)),
             ));
         }
     }
@@ -54,7 +40,7 @@ fn head() -> Head {
         let rows = if part == 0 { 0..N / 2 } else { N / 2..N };
         for y in rows.clone() {
             for x in 0..N {
-                let uv = Vec2::new(x as f32 / 11.0 * 0.977, noise.unit());
+                let uv = Vec2::new(x as f32 / 11.0 * 0.977, noise.uniform() as f32);
                 mesh.vertices.push(Vertex { point: y * N + x, uv });
             }
         }
@@ -68,13 +54,13 @@ fn head() -> Head {
         let (name, material) = [("M_Face", Material::Skin), ("teeth upper.001", Material::Gums)][part];
         mesh.parts.push(Part { name: name.into(), material, triangles: start..mesh.triangles.len() as u32 });
     }
-    mesh.occlusion = mesh.points.iter().map(|_| noise.unit()).collect();
+    mesh.occlusion = mesh.points.iter().map(|_| noise.uniform() as f32).collect();
     let mut shape = |name: &str, step: usize| BlendShape {
         name: name.into(),
         points: (0..N * N).step_by(step).collect(),
         offsets: (0..N * N)
             .step_by(step)
-            .map(|_| 0.01 * Vec3::new(noise.signed(), noise.signed(), 1e-6 * noise.signed()))
+            .map(|_| 0.01 * Vec3::new(signed(&mut noise), signed(&mut noise), 1e-6 * signed(&mut noise)))
             .collect(),
         ..BlendShape::default()
     };
@@ -93,7 +79,7 @@ fn head() -> Head {
         width: side,
         height: side,
         channels,
-        values: (0..side * side * channels).map(|_| 0.3 * noise.unit()).collect(),
+        values: (0..side * side * channels).map(|_| 0.3 * (noise.uniform() as f32)).collect(),
     };
     let maps = SkinMaps {
         melanin: Some(map(8, 1)),
@@ -531,23 +517,23 @@ fn corrupted_scenes_never_panic() {
     let end = shader + scene[shader..].windows(3).position(|w| w == b"\";\n").unwrap();
     scene.drain(shader - 9..end + 3);
     let foreign = format!("currentUnit -l centimeter -a degree -t pal;\n{QUAD}").into_bytes();
-    let mut noise = Noise(99);
+    let mut noise = SplitMix64(99);
     let (mut read_well, mut refused) = (0, 0);
     for round in 0..600 {
         let mut bytes = if round % 3 == 0 { scene.clone() } else { foreign.clone() };
-        for _ in 0..1 + noise.next() % 3 {
-            let at = (noise.next() % bytes.len() as u64) as usize;
-            match noise.next() % 5 {
-                0 => bytes[at] = noise.next() as u8,
+        for _ in 0..1 + noise.bits() % 3 {
+            let at = (noise.bits() % bytes.len() as u64) as usize;
+            match noise.bits() % 5 {
+                0 => bytes[at] = noise.bits() as u8,
                 1 => bytes.truncate(at.max(1)),
-                2 => bytes[at] = b"0123456789.-e;\"[]:{} \n"[(noise.next() % 22) as usize],
+                2 => bytes[at] = b"0123456789.-e;\"[]:{} \n"[(noise.bits() % 22) as usize],
                 3 => {
-                    let to = (at + (noise.next() % 200) as usize).min(bytes.len());
+                    let to = (at + (noise.bits() % 200) as usize).min(bytes.len());
                     bytes.drain(at..to);
                     bytes.push(b';');
                 }
                 _ => {
-                    let to = (at + (noise.next() % 400) as usize).min(bytes.len());
+                    let to = (at + (noise.bits() % 400) as usize).min(bytes.len());
                     let copy = bytes[at..to].to_vec();
                     bytes.splice(at..at, copy);
                 }

@@ -1,7 +1,6 @@
 //! Photon walks, stored between runs, in the user's cache folder.
 
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 use rubor_rig::error::SkinError;
 use rubor_rig::skin::medium::Medium;
@@ -11,8 +10,8 @@ use crate::error::{Failure, Outcome};
 use crate::notes::Note;
 use crate::output;
 
-/// Walks that take less time are not stored.
-const WORTH_KEEPING: Duration = Duration::from_secs(1);
+/// Walks of fewer photons are not stored: they take less than a second.
+const WORTH_KEEPING: u64 = 100_000;
 /// Seed of the walks.
 const SEED: u64 = 1;
 
@@ -43,9 +42,8 @@ pub fn table(anisotropy: f64, eta: f64, photons: u64) -> Outcome<(AlbedoTable, O
     if let Some(kept) = file.as_ref().and_then(|f| read(f, anisotropy, eta)) {
         return Ok((kept, None));
     }
-    let start = Instant::now();
     let table = AlbedoTable::build(anisotropy, eta, photons, SEED).map_err(Failure::input)?;
-    if start.elapsed() > WORTH_KEEPING
+    if photons >= WORTH_KEEPING
         && let Some(file) = file
     {
         match keep(&file, &table) {

@@ -1,6 +1,8 @@
 use std::io::Write;
 use std::path::Path;
 
+use rubor_rig::random::SplitMix64;
+
 use super::filter::{reduce, resample, smooth};
 use super::timecode::{Rate, Stamp, parse};
 use super::*;
@@ -15,22 +17,6 @@ fn live(rows: &[&str]) -> Result<Recording, String> {
 
 fn untouched() -> Retarget {
     Retarget { smoothing: None, tolerance: 0.0, limit: None, ..Retarget::default() }
-}
-
-/// A small generator of reproducible noise (SplitMix64).
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1u64 << 24) as f32
-    }
 }
 
 #[test]
@@ -158,14 +144,14 @@ fn eye_angles_become_look_shapes_only_where_there_are_none() {
 
 #[test]
 fn smoothing_removes_jitter_keeps_a_blink_and_delays_nothing() {
-    let mut noise = Noise(7);
+    let mut noise = SplitMix64(7);
     let times: Vec<f64> = (0..240).map(|i| f64::from(i) / 60.0).collect();
     let blink = |i: usize| match i {
         120 | 124 => 0.5,
         121..124 => 1.0,
         _ => 0.1,
     };
-    let raw: Vec<f32> = (0..240).map(|i| blink(i) + 0.01 * (noise.unit() - 0.5)).collect();
+    let raw: Vec<f32> = (0..240).map(|i| blink(i) + 0.01 * ((noise.uniform() as f32) - 0.5)).collect();
     let smoothed = smooth(&times, &raw, 0.04, 0.012);
     let rms = |values: &[f32]| {
         let still = values[..100].iter().map(|v| f64::from(v - 0.1).powi(2)).sum::<f64>() / 100.0;
@@ -198,11 +184,11 @@ fn resampling_keeps_lines_exactly_and_the_mean_of_what_is_between_frames() {
 
 #[test]
 fn reduced_keys_pass_every_value_within_the_tolerance() {
-    let mut noise = Noise(3);
+    let mut noise = SplitMix64(3);
     let mut value = 0.5_f32;
     let walk: Vec<f32> = (0..2000)
         .map(|i| {
-            value += if i % 200 < 100 { 0.002 } else { 0.05 * (noise.unit() - 0.5) };
+            value += if i % 200 < 100 { 0.002 } else { 0.05 * ((noise.uniform() as f32) - 0.5) };
             value
         })
         .collect();
@@ -347,7 +333,7 @@ fn a_sequence_loads_the_capture_that_it_names_and_nothing_outside_its_folder() {
 
 #[test]
 fn corrupted_recordings_never_panic() {
-    let mut noise = Noise(11);
+    let mut noise = SplitMix64(11);
     let good = csv(&[
         "Timecode,BlendShapeCount,JawOpen,EyeBlinkLeft,HeadYaw,LeftEyeYaw",
         "13:13:22:31.507,4,0.5,0.25,0.1,0.2",
@@ -359,12 +345,12 @@ fn corrupted_recordings_never_panic() {
     let mut accepted = 0;
     for round in 0..4000 {
         let mut bytes = if round % 2 == 0 { good.clone() } else { json.to_vec() };
-        for _ in 0..1 + noise.next() % 4 {
-            let at = (noise.next() % bytes.len() as u64) as usize;
-            match noise.next() % 4 {
-                0 => bytes[at] = noise.next() as u8,
+        for _ in 0..1 + noise.bits() % 4 {
+            let at = (noise.bits() % bytes.len() as u64) as usize;
+            match noise.bits() % 4 {
+                0 => bytes[at] = noise.bits() as u8,
                 1 => bytes.truncate(at.max(1)),
-                2 => bytes[at] = b"0123456789.,:;-e\n\"[]{}"[(noise.next() % 22) as usize],
+                2 => bytes[at] = b"0123456789.,:;-e\n\"[]{}"[(noise.bits() % 22) as usize],
                 _ => {
                     let copy = bytes[at..].to_vec();
                     bytes.extend(copy);
@@ -425,12 +411,12 @@ fn real_takes_of_live_link_face() {
 
 #[test]
 fn a_minute_at_60_frames_a_second_takes_less_than_a_second() {
-    let mut noise = Noise(5);
+    let mut noise = SplitMix64(5);
     let mut text = format!("Timecode,BlendShapeCount,{}\n", rubor_rig::names::ARKIT.join(","));
     for frame in 0..3600 {
         text.push_str(&format!("00:00:{:02}:{:02}.000,52", frame / 60, frame % 60));
         for _ in 0..52 {
-            text.push_str(&format!(",{:.10}", noise.unit()));
+            text.push_str(&format!(",{:.10}", (noise.uniform() as f32)));
         }
         text.push('\n');
     }

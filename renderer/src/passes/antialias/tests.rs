@@ -1,24 +1,14 @@
+use rubor_rig::random::SplitMix64;
+
 use super::reference::*;
 use super::scenes::*;
 use super::*;
 use crate::device::native;
 use crate::testing::{assert_layout, assert_workgroups, gpu, offsets};
 
-/// A small generator of repeatable noise (xorshift).
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> f32 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
-    }
-}
-
 /// Pictures that stress every branch, 8-bit values.
 fn hostile_pictures(width: usize, height: usize) -> Vec<(&'static str, Picture)> {
-    let mut noise = Noise(0x5eed);
+    let mut noise = SplitMix64(0x5eed);
     let byte = |v: f32| (v * 255.0).round() / 255.0;
     let stair = |slope: f64| {
         Picture::from_fn(width, height, move |x, y| {
@@ -27,18 +17,18 @@ fn hostile_pictures(width: usize, height: usize) -> Vec<(&'static str, Picture)>
         })
     };
     vec![
-        ("noise", Picture::from_fn(width, height, |_, _| [0, 1, 2, 3].map(|_| byte(noise.next())))),
+        ("noise", Picture::from_fn(width, height, |_, _| [0, 1, 2, 3].map(|_| byte(noise.uniform() as f32)))),
         (
             "binary noise",
             Picture::from_fn(width, height, |_, _| {
-                let v = noise.next().round();
+                let v = (noise.uniform() as f32).round();
                 [v, v, v, 1.0]
             }),
         ),
         (
             "sparse",
             Picture::from_fn(width, height, |_, _| {
-                let v = if noise.next() < 0.04 { 1.0 } else { 0.0 };
+                let v = if (noise.uniform() as f32) < 0.04 { 1.0 } else { 0.0 };
                 [v, 0.0, v, 1.0]
             }),
         ),
@@ -217,9 +207,9 @@ fn sizes_settings_and_inputs_are_checked() {
 fn depth_edges_and_predication() {
     let Some(gpu) = gpu() else { return };
     let size = [43usize, 38];
-    let mut noise = Noise(77);
+    let mut noise = SplitMix64(77);
     let picture = Picture::from_fn(size[0], size[1], |_, _| {
-        let v = (noise.next() * 64.0).round() / 255.0;
+        let v = ((noise.uniform() as f32) * 64.0).round() / 255.0;
         [v, v, v, 1.0]
     });
     let depth: Vec<f32> = (0..size[0] * size[1])
@@ -543,12 +533,13 @@ fn turned_and_mirrored_images_give_turned_and_mirrored_results() {
 fn searches_equal_those_with_the_search_texture() {
     // The published search on one line: bilinear fetches of two rows, two pixels per step, decoded by the texture.
     let table = lookups::search_texture_uncropped();
-    let mut noise = Noise(9);
+    let mut noise = SplitMix64(9);
     for _ in 0..2000 {
         let length = 80isize;
-        let dense = noise.next() * 0.3 + 0.7;
-        let line: Vec<bool> = (0..length).map(|_| noise.next() < dense).collect();
-        let cross: [Vec<bool>; 2] = [0, 1].map(|_| (0..length).map(|_| noise.next() > dense + 0.2).collect());
+        let dense = (noise.uniform() as f32) * 0.3 + 0.7;
+        let line: Vec<bool> = (0..length).map(|_| (noise.uniform() as f32) < dense).collect();
+        let cross: [Vec<bool>; 2] =
+            [0, 1].map(|_| (0..length).map(|_| (noise.uniform() as f32) > dense + 0.2).collect());
         let bit = |bits: &[bool], x: isize| usize::from(bits[x.clamp(0, length - 1) as usize]);
         // Sums of weights in 1/32; the row above has no edges along the line.
         let fetch = |x: isize, before: isize| {

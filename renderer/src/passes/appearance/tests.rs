@@ -4,6 +4,7 @@ use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Distribution, Head, WrinkleZone};
 use rubor_rig::hemoglobin::blend_texel;
 use rubor_rig::map::Map;
+use rubor_rig::random;
 
 use crate::channels::Channel;
 use crate::settings::{ColorMethod, WrinkleMethod};
@@ -35,9 +36,7 @@ fn flushed_dome() -> Head {
 
 /// Numbers that look random, 0 to 1.
 fn noise(i: usize) -> f32 {
-    let mut z = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x0bad_5eed;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    (z >> 40) as f32 / (1u64 << 24) as f32
+    random::unit(random::mixed(i as u64 + 1)) as f32
 }
 
 /// Address of the hemoglobin in the middle of the picture, and all albedos.

@@ -1,3 +1,5 @@
+use rubor_rig::random;
+
 use super::*;
 use crate::testing::{gpu, half_image, read_image, recorded};
 
@@ -21,10 +23,7 @@ fn composed(
 fn diffuse_light_times_albedo_plus_direct_light_stands_before_the_background() {
     let Some(gpu) = gpu() else { return };
     let size = [27, 51];
-    let noise = |i: usize, k: u64| {
-        let z = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15 ^ (k << 17));
-        ((z ^ (z >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f32 / (1 << 24) as f32
-    };
+    let noise = |i: usize, k: u64| random::unit(random::mixed(i as u64 + (k << 32) + 1)) as f32;
     let texels = |k: u64, most: f32| -> Vec<[f32; 4]> {
         (0..27 * 51).map(|i| std::array::from_fn(|c| most * noise(i, k + c as u64))).collect()
     };

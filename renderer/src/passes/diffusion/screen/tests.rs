@@ -2,6 +2,7 @@ use std::sync::Arc;
 
 use glam::Mat4;
 use half::f16;
+use rubor_rig::random::SplitMix64;
 use rubor_rig::skin::diffusion::BetterDipole;
 use rubor_rig::skin::kernel::SeparableKernel;
 use rubor_rig::skin::medium::{SKIN1, rgb_media};
@@ -29,18 +30,6 @@ const METHODS: [ScatterMethod; 6] = [
     ScatterMethod::BurleyDisk(16),
     ScatterMethod::ReferenceScreen,
 ];
-
-/// xorshift64*: 0 to 1.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
 
 fn half(v: f64) -> f64 {
     f16::from_f64(v).to_f64()
@@ -185,8 +174,8 @@ fn skin() -> Arc<Profile> {
 
 /// Two tilted surfaces, holes, noise and very bright pixels at an odd size; 2.2 pixels per millimetre.
 fn hostile(seed: u64) -> Frame {
-    let mut random = Random(seed);
-    let mut noise: Vec<f64> = (0..27 * 51 * 8).map(|_| random.next()).collect();
+    let mut random = SplitMix64(seed);
+    let mut noise: Vec<f64> = (0..27 * 51 * 8).map(|_| random.uniform()).collect();
     let mut next = || noise.pop().unwrap();
     let cells: Vec<_> = (0..27 * 51)
         .map(|i| {
