@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use rubor_assets::{import, synthesize};
+use rubor_assets::{check, import, synthesize};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_rig::lights::{LIGHT_RIGS, light_rig};
@@ -47,7 +47,13 @@ pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
         }
     };
     let imported = import::gltf::from_bytes(&bytes, name)?;
-    let notes = imported.notes.iter().map(|n| Note::new(name.display().to_string(), n.to_string())).collect();
+    let about = name.display().to_string();
+    let mut notes: Vec<Note> =
+        imported.notes.iter().map(|n| Note::new(about.as_str(), n.to_string())).collect();
+    notes.extend(check::head::size(&imported.head).map(|f| {
+        let fix = f.fix.map(|fix| format!("; {fix}")).unwrap_or_default();
+        Note::new(about.as_str(), f.message + &fix)
+    }));
     let rig = match imported.rig {
         None => None,
         Some(value) => {

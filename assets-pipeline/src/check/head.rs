@@ -21,38 +21,37 @@ pub fn check(head: &Head) -> Vec<Finding> {
         findings.push(Finding::error("", e.to_string()));
         return findings;
     }
-    size(head, &mut findings);
+    findings.extend(size(head));
     parts(head, &mut findings);
     triangles(head, &mut findings);
     shapes(head, &mut findings);
     names(head, &mut findings);
     if head.landmarks.is_empty() {
-        let message =
-            "there are no landmarks: synthesised maps and camera framing guess the face from its size";
+        let message = "there are no landmarks: synthesised maps have no hair, brows and wrinkles, the camera guesses the face from its size";
         findings.push(Finding::note("landmarks", message));
     }
     findings
 }
 
-fn size(head: &Head, findings: &mut Vec<Finding>) {
+/// A warning where no head is as high as this one.
+pub fn size(head: &Head) -> Option<Finding> {
     let height = head.height();
-    if height > 0.0 && !HEIGHTS_METRES.contains(&height) {
-        let unit = [("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254)]
-            .into_iter()
-            .find(|(_, metres)| HEIGHTS_METRES.contains(&(height * metres)));
-        let message = format!(
-            "the head is {height:.3} m high, where {} to {} m are likely: scattering would be far too sharp or soft",
-            HEIGHTS_METRES.start(),
-            HEIGHTS_METRES.end()
-        );
-        let finding = Finding::warning("mesh", message);
-        findings.push(match unit {
-            Some((unit, factor)) => {
-                finding.fix(format!("it looks like {unit}: scale the mesh by {factor} before import"))
-            }
-            None => finding.fix("scale the mesh to metres before import"),
-        });
+    if height <= 0.0 || HEIGHTS_METRES.contains(&height) {
+        return None;
     }
+    let unit = [("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254)]
+        .into_iter()
+        .find(|(_, metres)| HEIGHTS_METRES.contains(&(height * metres)));
+    let message = format!(
+        "the head is {height:.3} m high, where {} to {} m are likely: scattering would be far too sharp or soft",
+        HEIGHTS_METRES.start(),
+        HEIGHTS_METRES.end()
+    );
+    let fix = match unit {
+        Some((unit, factor)) => format!("it looks like {unit}: scale the mesh by {factor} before import"),
+        None => "scale the mesh to metres before import".into(),
+    };
+    Some(Finding::warning("mesh", message).fix(fix))
 }
 
 fn parts(head: &Head, findings: &mut Vec<Finding>) {
