@@ -17,13 +17,15 @@ pub(crate) fn record(
 ) -> Result<Option<Image>, RenderError> {
     frame.pose(r);
     let light = frame.light(r);
-    diffusion.before_view(r, &frame.heads, &light);
+    if frame.needs.before_view {
+        diffusion.before_view(r, &frame.before(r, &light));
+    }
 
     let mut samples = Samples::default();
     for subsample in frame.subsamples() {
         let seen = frame.see(r, subsample);
         let lit = frame.shade(r, &light, &seen, &samples);
-        let diffuse = diffusion.after_shading(r, &seen, &lit);
+        let diffuse = diffusion.after_shading(r, &frame.heads, &seen, &lit);
         frame.show(r, &light, seen, lit, &diffuse, &mut samples);
     }
     frame.antialias(r, samples)

@@ -5,10 +5,11 @@ use crate::channels::Channel;
 use crate::device::{Image, ImageSpec, Recorder};
 use crate::error::RenderError;
 use crate::passes::antialias::{self, History, Subsample};
+use crate::passes::diffusion::Before;
 use crate::passes::shade::{Lighting, Lit};
 use crate::scene::lamp::{Illumination, place_lights};
 use crate::scene::placement::{average_light, receivers};
-use crate::scene::view::{Seen, pixels_per_mm, view};
+use crate::scene::view::{Seen, View, pixels_per_mm, view};
 
 /// Results of the samples of a pixel so far.
 #[derive(Default)]
@@ -47,6 +48,24 @@ impl<'a> Frame<'a> {
         self.settings.antialias().mode.subsamples(self.past.frames)
     }
 
+    /// The frame for methods that work before the view.
+    pub(crate) fn before<'f>(&'f self, r: &mut Recorder<'_>, light: &'f Illumination<'f>) -> Before<'f> {
+        Before {
+            scene: self.scene,
+            quality: &self.settings.quality,
+            size: self.settings.frame_size(),
+            heads: &self.heads,
+            light,
+            view: r.uniform("view", &self.view([[0.0; 2]; 2])),
+            shade: &self.passes.shade,
+            transmittance: self.passes.transmittance.as_ref().map(|(_, t)| t),
+        }
+    }
+
+    fn view(&self, jitters: [[f32; 2]; 2]) -> View {
+        view(self.scene, &self.lamps, self.settings.frame_size(), jitters, self.past.clip_from_world)
+    }
+
     /// What the camera sees through one sample of each pixel.
     pub(crate) fn see(&self, r: &mut Recorder<'_>, subsample: &Subsample) -> Seen {
         let all = self.subsamples();
@@ -57,7 +76,7 @@ impl<'a> Frame<'a> {
         // A camera samples a place in the pixel by shifting the image in the opposite direction.
         let jitters = [subsample.position_px.map(|p| -p), shading_jitter];
         let size = self.settings.frame_size();
-        let view = view(self.scene, &self.lamps, size, jitters, self.past.clip_from_world);
+        let view = self.view(jitters);
         let pixels_per_mm = pixels_per_mm(self.scene, &view);
         let view = r.uniform("view", &view);
         let [ids, depth] = self.passes.visibility.record(r, &view, &self.heads, size);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! needs --------> inputs that the frame prepares: backs of the heads, a margin around the picture, transmittance
-//! before_view --> maps of a head, light on all of its surface
+//! before_view --> maps of a head, light on all of its surface; only for methods that ask for it
 //! after_shading -> diffuse radiance from images of the lit surface
 //! ```
 //!
@@ -18,11 +18,11 @@ use rubor_rig::skin::profile::Profile;
 
 use crate::device::{Gpu, Image, Recorder};
 use crate::error::RenderError;
-use crate::passes::shade::Lit;
-use crate::scene::PosedHead;
+use crate::passes::shade::{Lit, Shade, Transmittance};
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
-use crate::settings::ScatterMethod;
+use crate::scene::{PosedHead, Scene};
+use crate::settings::{Quality, ScatterMethod};
 
 /// Requirements of a method on the frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,12 +33,28 @@ pub(crate) struct Needs {
     pub(crate) margin: f32,
     /// Whether transmittance has to be added; methods whose integral includes it do not need it.
     pub(crate) transmittance: bool,
+    /// Whether it works before the view.
+    pub(crate) before_view: bool,
 }
 
 impl Default for Needs {
     fn default() -> Self {
-        Self { backs: false, margin: 1.0, transmittance: true }
+        Self { backs: false, margin: 1.0, transmittance: true, before_view: false }
     }
+}
+
+/// The frame before any sample of a pixel is drawn.
+pub(crate) struct Before<'a> {
+    pub(crate) scene: &'a Scene<'a>,
+    pub(crate) quality: &'a Quality,
+    /// Size of the picture with all samples, pixels.
+    pub(crate) size: [u32; 2],
+    pub(crate) heads: &'a [PosedHead<'a>],
+    pub(crate) light: &'a Illumination<'a>,
+    /// [`crate::scene::view::View`] through the middle of each pixel.
+    pub(crate) view: wgpu::Buffer,
+    pub(crate) shade: &'a Shade,
+    pub(crate) transmittance: Option<&'a Transmittance>,
 }
 
 /// A method that draws a frame in one go. Every hook is optional.
@@ -48,11 +64,18 @@ pub(crate) trait Diffusion {
         Needs::default()
     }
 
-    /// Work that does not depend on the view: maps of the heads, light on all of their surface.
-    fn before_view(&mut self, _r: &mut Recorder<'_>, _heads: &[PosedHead<'_>], _light: &Illumination<'_>) {}
+    /// Work before any sample of a pixel is drawn: maps of the heads, light on all of their surface. Only for methods
+    /// with [`Needs::before_view`].
+    fn before_view(&mut self, _r: &mut Recorder<'_>, _frame: &Before<'_>) {}
 
     /// Diffuse radiance of a white surface from images of its light.
-    fn after_shading(&mut self, _r: &mut Recorder<'_>, _seen: &Seen, lit: &Lit) -> Image {
+    fn after_shading(
+        &mut self,
+        _r: &mut Recorder<'_>,
+        _heads: &[PosedHead<'_>],
+        _seen: &Seen,
+        lit: &Lit,
+    ) -> Image {
         lit.irradiance.clone()
     }
 }

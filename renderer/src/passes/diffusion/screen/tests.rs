@@ -165,7 +165,7 @@ fn run_with(
 
 fn run(gpu: &Gpu, wanted: ScatterMethod, profile: &Profile, frame: &Frame) -> Vec<[f64; 4]> {
     let mut diffusion = diffusion::method(gpu, wanted, profile).unwrap().expect("it draws in one go");
-    run_with(gpu, frame, |r, seen, lit| diffusion.after_shading(r, seen, lit))
+    run_with(gpu, frame, |r, seen, lit| diffusion.after_shading(r, &[], seen, lit))
 }
 
 fn skin() -> Arc<Profile> {
@@ -568,7 +568,7 @@ fn any_zoom_gives_numbers() {
                 }
                 frame.focal_px = f64::from(focal as f32);
                 frame.depth_mm.iter_mut().for_each(|d| *d *= depth / 400.0);
-                let found = run_with(gpu, &frame, |r, seen, lit| diffusion.after_shading(r, seen, lit));
+                let found = run_with(gpu, &frame, |r, seen, lit| diffusion.after_shading(r, &[], seen, lit));
                 for p in found {
                     assert!(p[..3].iter().all(|v| v.is_finite() && *v >= 0.0), "{method} {focal}: {p:?}");
                 }

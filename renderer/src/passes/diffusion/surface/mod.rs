@@ -60,7 +60,8 @@ pub(crate) fn program() -> Program {
 const PICTURE_MARGIN: f32 = 1.25;
 
 /// Requirements on the frame: the integral needs backs and the margin, and includes the light through thin parts.
-pub(crate) const NEEDS: Needs = Needs { backs: true, margin: PICTURE_MARGIN, transmittance: false };
+pub(crate) const NEEDS: Needs =
+    Needs { backs: true, margin: PICTURE_MARGIN, transmittance: false, before_view: false };
 
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]

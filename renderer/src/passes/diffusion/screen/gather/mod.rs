@@ -6,6 +6,7 @@ use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
 use crate::passes::diffusion::Diffusion;
 use crate::passes::pixel_groups;
 use crate::passes::shade::Lit;
+use crate::scene::PosedHead;
 use crate::scene::view::Seen;
 
 const SHARED: Module = module!("gather", "gather.wesl");
@@ -67,7 +68,7 @@ impl Gather {
 }
 
 impl Diffusion for Gather {
-    fn after_shading(&mut self, r: &mut Recorder<'_>, seen: &Seen, lit: &Lit) -> Image {
+    fn after_shading(&mut self, r: &mut Recorder<'_>, _: &[PosedHead<'_>], seen: &Seen, lit: &Lit) -> Image {
         let size = lit.irradiance.size();
         let scattered = r.image("scattered", ImageSpec::light(size));
         let resources = [

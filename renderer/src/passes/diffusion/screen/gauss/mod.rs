@@ -35,6 +35,7 @@ use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
 use crate::error::RenderError;
 use crate::passes::diffusion::Diffusion;
 use crate::passes::shade::Lit;
+use crate::scene::PosedHead;
 use crate::scene::view::Seen;
 
 const HALVE: Module = module!("gauss_halve", "halve.wesl");
@@ -233,7 +234,7 @@ impl ScreenGauss {
 }
 
 impl Diffusion for ScreenGauss {
-    fn after_shading(&mut self, r: &mut Recorder<'_>, seen: &Seen, lit: &Lit) -> Image {
+    fn after_shading(&mut self, r: &mut Recorder<'_>, _: &[PosedHead<'_>], seen: &Seen, lit: &Lit) -> Image {
         let plan = plan(&self.gaussians, seen.pixels_per_mm);
         let lights = match plan.len() {
             1 => vec![lit.irradiance.clone()],

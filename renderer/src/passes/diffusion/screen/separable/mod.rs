@@ -15,6 +15,7 @@ use crate::device::{Gpu, Image, ImageSpec, Recorder};
 use crate::error::RenderError;
 use crate::passes::diffusion::Diffusion;
 use crate::passes::shade::Lit;
+use crate::scene::PosedHead;
 use crate::scene::view::Seen;
 
 /// The method, ready for one profile.
@@ -41,7 +42,7 @@ impl Separable {
 }
 
 impl Diffusion for Separable {
-    fn after_shading(&mut self, r: &mut Recorder<'_>, seen: &Seen, lit: &Lit) -> Image {
+    fn after_shading(&mut self, r: &mut Recorder<'_>, _: &[PosedHead<'_>], seen: &Seen, lit: &Lit) -> Image {
         let spec = ImageSpec::light(lit.irradiance.size());
         let [scratch, scattered] = ["scatter scratch", "scattered"].map(|label| r.image(label, spec));
         let [horizontal, vertical] = &self.lines;
