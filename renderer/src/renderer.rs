@@ -12,10 +12,11 @@ use crate::error::RenderError;
 use crate::frame::{Frame, Passes, Past, realtime, reference};
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::diffusion::{Needs, Prepared, surface};
+use crate::passes::geometry::raster::Rasteriser;
 use crate::scene::lamp::lamps;
 use crate::scene::posed_head::{Instance, posed};
 use crate::scene::{MAX_HEADS, MAX_LIGHTS, Scene};
-use crate::settings::{ScatterMethod, Settings};
+use crate::settings::{RasterMethod, ScatterMethod, Settings};
 
 /// A picture, rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,11 +44,16 @@ pub struct FrameStats {
 
 /// Frames that [`Renderer::measure`] submits before it waits: enough to keep the device busy.
 const FRAMES_IN_FLIGHT: usize = 3;
+/// Frames of [`Renderer::choose_raster`] for each method: those left out, and those whose median counts.
+const WARM_UP: u32 = 3;
+const MEASURED: u32 = 9;
 
 /// Draws scenes. Keeps pipelines, images while frames use them, and the history of temporal antialiasing.
 pub struct Renderer {
     gpu: Gpu,
     passes: Passes,
+    /// What `auto` stands for.
+    fastest: Rasteriser,
     diffusion: Prepared,
     instances: Vec<Instance>,
     images: Images,
@@ -137,7 +143,8 @@ impl Renderer {
     /// The device refused a pipeline.
     pub fn new(gpu: Gpu) -> Result<Self, RenderError> {
         let renderer = Self {
-            passes: Passes::new(&gpu),
+            passes: Passes::new(&gpu, Rasteriser::Hardware),
+            fastest: Rasteriser::Hardware,
             diffusion: Prepared::default(),
             instances: Vec::new(),
             images: Images::default(),
@@ -289,6 +296,41 @@ impl Renderer {
         self.gpu.check()
     }
 
+    /// Measures what turns triangles into pixels faster on this device, for a scene, and uses it where the settings say
+    /// [`RasterMethod::Auto`]. A software device is not measured: its raster unit is faster. Begins a new history.
+    ///
+    /// # Errors
+    /// As [`Renderer::measure`].
+    pub async fn choose_raster(
+        &mut self,
+        scene: &Scene<'_>,
+        settings: &Settings,
+    ) -> Result<RasterMethod, RenderError> {
+        if self.gpu.info.device_type == wgpu::DeviceType::Cpu || !self.gpu.has_timestamps {
+            return Ok(RasterMethod::Hardware);
+        }
+        let mut cost_ms = [f64::INFINITY; 2];
+        let methods = [RasterMethod::Hardware, RasterMethod::Compute];
+        let mut settings = settings.clone();
+        if matches!(settings.quality.scatter, ScatterMethod::ReferenceSurface(_)) {
+            settings.quality.scatter = ScatterMethod::None;
+        }
+        for (cost_ms, method) in cost_ms.iter_mut().zip(methods) {
+            settings.quality.raster = method;
+            let mut frames: Vec<_> =
+                self.measure(scene, &settings, WARM_UP, MEASURED).await?.iter().map(|t| t.frame_ms).collect();
+            frames.sort_by(f64::total_cmp);
+            *cost_ms = frames.get(frames.len() / 2).copied().unwrap_or(f64::INFINITY);
+        }
+        self.past.forget();
+        let (rasteriser, method) = match cost_ms[1] < cost_ms[0] {
+            true => (Rasteriser::compute(&self.gpu), RasterMethod::Compute),
+            false => (Rasteriser::Hardware, RasterMethod::Hardware),
+        };
+        self.fastest = rasteriser;
+        Ok(method)
+    }
+
     /// A channel of the last frame, which its settings have to name in [`crate::settings::Output::channels`]; those over
     /// points and vertices are always there. Empty where the frame has no such channel.
     ///
@@ -339,8 +381,25 @@ impl Renderer {
             }
         }
         self.diffusion.prepare(&self.gpu, settings.quality.scatter, settings.quality.profile.shared())?;
+        let rasteriser = self.rasteriser(scene, settings);
+        if self.passes.rasteriser != rasteriser {
+            self.passes = Passes::new(&self.gpu, rasteriser);
+        }
         let needs = self.needs();
-        self.passes.prepare(&self.gpu, settings, &needs)
+        self.passes.prepare(&self.gpu, scene, settings, &needs)
+    }
+
+    /// What the settings ask for, as far as the device has the memory.
+    fn rasteriser(&self, scene: &Scene<'_>, settings: &Settings) -> Rasteriser {
+        let wanted = match settings.quality.raster {
+            RasterMethod::Auto => self.fastest,
+            RasterMethod::Hardware => Rasteriser::Hardware,
+            RasterMethod::Compute => Rasteriser::compute(&self.gpu),
+        };
+        let [width, height] = settings.frame_size().map(u64::from);
+        let shadows = u64::from(settings.quality.shadow_size).pow(2) * (scene.lights.len() as u64 + 1);
+        let most = self.gpu.device.limits().max_storage_buffer_binding_size;
+        if (8 * width * height).max(4 * shadows) > most { Rasteriser::Hardware } else { wanted }
     }
 
     fn needs(&self) -> Needs {
@@ -402,6 +461,8 @@ impl Renderer {
     fn memory_bytes(&self, scene: &Scene<'_>) -> u64 {
         self.images.bytes()
             + self.instances.iter().map(Instance::bytes).sum::<u64>()
+            + self.passes.visibility.bytes()
+            + self.passes.shadow.bytes()
             + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
             + self.past.history.as_ref().map_or(0, History::memory_bytes)
             + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()

@@ -106,10 +106,12 @@ fn assert_layout_of(wgsl: &str, structure: &str, size: usize, fields: &[(&str, u
     assert_eq!(members, fields, "fields of {structure}");
 }
 
-/// Features that shaders of the project may use: half floats packed in words, and the primitive index (with a
-/// version without).
-const CAPABILITIES: naga::valid::Capabilities =
-    naga::valid::Capabilities::PRIMITIVE_INDEX.union(naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32);
+/// Features that shaders of the project may use: half floats packed in words, and, with a version without, the
+/// primitive index and 64-bit atomics.
+const CAPABILITIES: naga::valid::Capabilities = naga::valid::Capabilities::PRIMITIVE_INDEX
+    .union(naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32)
+    .union(naga::valid::Capabilities::SHADER_INT64)
+    .union(naga::valid::Capabilities::SHADER_INT64_ATOMIC_MIN_MAX);
 
 /// Parses and validates a shader and returns the workgroup size of each of its compute entry points.
 pub(crate) fn validated_workgroups(wgsl: &str) -> Vec<(String, [u32; 3])> {

@@ -81,8 +81,10 @@ pub(crate) async fn list_adapters() -> Vec<AdapterDescription> {
 }
 
 /// Optional features, used where the adapter has them.
-const WELCOME_FEATURES: wgpu::Features =
-    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::PRIMITIVE_INDEX);
+const WELCOME_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
+    .union(wgpu::Features::PRIMITIVE_INDEX)
+    .union(wgpu::Features::SHADER_INT64)
+    .union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
 
 impl Gpu {
     /// Opens the best adapter, or the one whose index or part of whose name (any letter case) is `wanted`.

@@ -65,8 +65,8 @@ pub(crate) struct Raster<'a> {
     pub(crate) vertex: &'a str,
     pub(crate) fragment: Option<&'a str>,
     pub(crate) targets: &'a [Option<wgpu::ColorTargetState>],
-    /// Comparison of a fragment's depth with the stored depth.
-    pub(crate) nearer: wgpu::CompareFunction,
+    /// Comparison of a fragment's depth with the stored depth; none without a depth attachment.
+    pub(crate) nearer: Option<wgpu::CompareFunction>,
     pub(crate) writes_depth: bool,
 }
 
@@ -162,10 +162,10 @@ impl RasterKernel {
                 buffers: &[],
             },
             primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
+            depth_stencil: raster.nearer.map(|nearer| wgpu::DepthStencilState {
                 format: wgpu::TextureFormat::Depth32Float,
                 depth_write_enabled: Some(raster.writes_depth),
-                depth_compare: Some(raster.nearer),
+                depth_compare: Some(nearer),
                 stencil: Default::default(),
                 bias: Default::default(),
             }),

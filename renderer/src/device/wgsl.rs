@@ -32,11 +32,12 @@ macro_rules! module {
 pub(crate) use module;
 
 /// Modules that every shader may import.
-const SHARED: [Module; 6] = [
+const SHARED: [Module; 7] = [
     module!("authored", "../shared/authored.wesl"),
     module!("blocks", "../shared/blocks.wesl"),
     module!("math", "../shared/math.wesl"),
     module!("light", "../shared/light.wesl"),
+    module!("shadow_map", "../shared/shadow_map.wesl"),
     module!("surface", "../shared/surface.wesl"),
     module!("view", "../shared/view.wesl"),
 ];

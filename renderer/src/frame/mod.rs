@@ -21,6 +21,7 @@ use crate::passes::compose::Compose;
 use crate::passes::diffusion::Needs;
 use crate::passes::display::Display;
 use crate::passes::geometry::morph::Morph;
+use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::geometry::shadow::Shadow;
 use crate::passes::geometry::tangent_frames::TangentFrames;
 use crate::passes::geometry::velocity::Velocity;
@@ -30,11 +31,12 @@ use crate::passes::hair::fibre::Fibre;
 use crate::passes::hair::overlay::Overlay;
 use crate::passes::resolve::Resolve;
 use crate::passes::shade::{Shade, Transmittance};
-use crate::scene::{Light, PosedHead, Scene};
+use crate::scene::{Light, MAX_LIGHTS, PosedHead, Scene};
 use crate::settings::{Settings, ToneMap, TransmitMethod};
 
 /// The passes of frames, with their pipelines.
 pub(crate) struct Passes {
+    pub(crate) rasteriser: Rasteriser,
     pub(crate) morph: Morph,
     pub(crate) tangent_frames: TangentFrames,
     pub(crate) appearance: Appearance,
@@ -85,20 +87,21 @@ impl Past {
 }
 
 impl Passes {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+    pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
         let tone_map = ToneMap::Filmic;
         Self {
+            rasteriser,
             morph: Morph::new(gpu),
             tangent_frames: TangentFrames::new(gpu),
             appearance: Appearance::new(gpu),
-            shadow: Shadow::new(gpu),
-            visibility: Visibility::new(gpu),
-            shade: Shade::new(gpu),
+            shadow: Shadow::new(gpu, rasteriser),
+            visibility: Visibility::new(gpu, rasteriser),
+            shade: Shade::new(gpu, rasteriser),
             compose: Compose::new(gpu),
             velocity: Velocity::new(gpu),
             fibre: Fibre::new(gpu),
-            cropped_hair: CroppedHair::new(gpu),
-            overlay: Overlay::new(gpu),
+            cropped_hair: CroppedHair::new(gpu, rasteriser),
+            overlay: Overlay::new(gpu, rasteriser),
             tone_map,
             resolve: Resolve::new(gpu, tone_map),
             display: Display::new(gpu, tone_map),
@@ -114,9 +117,15 @@ impl Passes {
     pub(crate) fn prepare(
         &mut self,
         gpu: &Gpu,
+        scene: &Scene<'_>,
         settings: &Settings,
         needs: &Needs,
     ) -> Result<(), RenderError> {
+        let has_holes = scene.heads.iter().any(|h| h.head.cut_triangles > 0);
+        self.visibility.prepare(gpu, settings.frame_size(), has_holes);
+        // One more than the scene has: a dark lamp may be added for transmittance.
+        let lights = (scene.lights.len() + 1).min(MAX_LIGHTS);
+        self.shadow.prepare(gpu, lights, settings.quality.shadow_size, has_holes);
         let wanted = settings.antialias();
         let size = settings.output.size;
         if wanted.mode == antialias::Mode::None {

@@ -26,6 +26,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub enum Stage {
     /// The method does nothing.
     Nowhere,
+    /// While triangles become pixels.
+    Geometry,
     /// Before the view is known: maps of the head, light on all of its surface.
     BeforeView,
     /// While the visible surfaces are lit.
@@ -365,6 +367,15 @@ groups! {
         /// A sharp and a broad lobe with the mean square slope of the one lobe.
         TwoLobes, "two-lobes", Shading, "Graham et al. 2013";
     }
+    /// What turns triangles into pixels.
+    RasterMethod, "raster", "What turns triangles into pixels" {
+        /// The faster of the two, once a device and a scene have been measured; until then the raster units.
+        Auto, "auto", Geometry, "";
+        /// The raster units of the device.
+        Hardware, "hardware", Geometry, "Burns and Hunt 2013";
+        /// Compute: one invocation per triangle, the largest key of depth and number per pixel.
+        Compute, "compute", Geometry, "Laine and Karras 2011; Karis et al. 2021";
+    }
     /// Antialiasing of the displayed picture.
     AntialiasMethod, "antialias", "Antialiasing" {
         /// Edges stay stairs.
@@ -417,7 +428,11 @@ mod tests {
                 let text = row.example();
                 assert_eq!(text.parse::<M>().expect("an example parses").to_string(), text);
                 assert!(row.summary.trim().ends_with('.'), "{}: {:?}", row.name, row.summary);
-                assert!(!row.source.is_empty() || row.stage == Stage::Nowhere, "{} has a source", row.name);
+                assert!(
+                    !row.source.is_empty() || [Stage::Nowhere, Stage::Geometry].contains(&row.stage),
+                    "{} has a source",
+                    row.name
+                );
             }
             let mut names: Vec<_> = group.methods.iter().map(|m| m.name).collect();
             names.sort_unstable();
@@ -429,9 +444,10 @@ mod tests {
         check::<ColorMethod>(&ColorMethod::GROUP);
         check::<WrinkleMethod>(&WrinkleMethod::GROUP);
         check::<SpecularMethod>(&SpecularMethod::GROUP);
+        check::<RasterMethod>(&RasterMethod::GROUP);
         check::<AntialiasMethod>(&AntialiasMethod::GROUP);
         check::<ToneMap>(&ToneMap::GROUP);
-        assert_eq!(GROUPS.len(), 7, "a new group is checked above");
+        assert_eq!(GROUPS.len(), 8, "a new group is checked above");
         assert_eq!(ScatterMethod::all().count(), ScatterMethod::GROUP.methods.len());
         assert_eq!("reference-surface".parse(), Ok(ScatterMethod::ReferenceSurface(64)));
     }

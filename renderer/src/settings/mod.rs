@@ -30,8 +30,8 @@ use crate::channels::Channel;
 pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
-    AntialiasMethod, ColorMethod, GROUPS, Group, Method, ScatterMethod, SpecularMethod, Stage, ToneMap,
-    TransmitMethod, UnknownMethod, WrinkleMethod,
+    AntialiasMethod, ColorMethod, GROUPS, Group, Method, RasterMethod, ScatterMethod, SpecularMethod, Stage,
+    ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
 
@@ -78,6 +78,8 @@ pub struct Quality {
     pub wrinkles: WrinkleMethod,
     /// The highlight of skin
     pub specular: SpecularMethod,
+    /// What turns triangles into pixels; the picture is the same up to the rounding of edges
+    pub raster: RasterMethod,
     /// Antialiasing of the displayed picture
     pub antialias: AntialiasMethod,
     /// Thresholds and search lengths of the antialiasing
@@ -149,6 +151,7 @@ impl Default for Quality {
             color: ColorMethod::Hemoglobin,
             wrinkles: WrinkleMethod::PartialDerivative,
             specular: SpecularMethod::OneLobe,
+            raster: RasterMethod::Auto,
             antialias: AntialiasMethod::SmaaS2x,
             antialias_preset: AntialiasPreset::High,
             antialias_patterns: AntialiasPatterns::Revised,

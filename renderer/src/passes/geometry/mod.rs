@@ -1,6 +1,7 @@
 //! The surface: deformed points, tangent frames, visibility from lights and camera, motion.
 
 pub(crate) mod morph;
+pub(crate) mod raster;
 pub(crate) mod shadow;
 pub(crate) mod tangent_frames;
 pub(crate) mod velocity;

@@ -4,14 +4,30 @@ pub(crate) mod cropped_hair;
 pub(crate) mod fibre;
 pub(crate) mod overlay;
 
+use crate::device::kernel::Resource;
 use crate::device::wgsl::Program;
-use crate::device::{Attachments, Gpu, Image, Raster, RasterKernel, color_attachment, depth_attachment};
+use crate::device::{
+    Attachments, Bind, Draw, Gpu, Image, Raster, RasterKernel, Recorder, color_attachment, depth_attachment,
+};
+use crate::passes::geometry::raster::Rasteriser;
 
 /// Pipelines that draw premultiplied colours over half float images: colour only, and colour with motion.
-struct Blended([RasterKernel; 2]);
+struct Blended {
+    kernels: [RasterKernel; 2],
+    /// Whether the shader tests depth, as there is no depth texture.
+    tests_depth: bool,
+}
 
 impl Blended {
-    fn new(gpu: &Gpu, label: &'static str, program: &Program, [vertex, fragment]: [&str; 2]) -> Self {
+    fn new(
+        gpu: &Gpu,
+        rasteriser: Rasteriser,
+        label: &'static str,
+        program: Program,
+        [vertex, fragment]: [&str; 2],
+    ) -> Self {
+        let tests_depth = rasteriser != Rasteriser::Hardware;
+        let program = program.flag("tests_depth", tests_depth).flag("stored_shadows", tests_depth);
         let target = Some(wgpu::ColorTargetState {
             format: wgpu::TextureFormat::Rgba16Float,
             blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
@@ -25,25 +41,32 @@ impl Blended {
                 vertex,
                 fragment: Some(fragment),
                 targets,
-                nearer: wgpu::CompareFunction::Greater,
+                nearer: (!tests_depth).then_some(wgpu::CompareFunction::Greater),
                 writes_depth: false,
             };
             RasterKernel::new(gpu, &raster)
         };
-        Self([kernel(&targets[..1]), kernel(&targets)])
+        Self { kernels: [kernel(&targets[..1]), kernel(&targets)], tests_depth }
     }
 
-    /// The one for a picture with or without motion.
-    fn kernel(&self, velocity: Option<&Image>) -> &RasterKernel {
-        &self.0[usize::from(velocity.is_some())]
-    }
-}
-
-/// Targets of blended triangles: a picture, its motion if it has one, and depth that is only tested.
-fn drawn_over<'a>(hdr: &'a Image, velocity: Option<&'a Image>, depth: &'a Image) -> Attachments<'a> {
-    let images = std::iter::once(hdr).chain(velocity);
-    Attachments {
-        colors: images.map(|image| color_attachment(image.view(), wgpu::LoadOp::Load)).collect(),
-        depth: depth_attachment(depth.view(), wgpu::LoadOp::Load),
+    /// Draws over a picture and, where there is one, its motion; depth is only tested. Each draw gets the depth as
+    /// `scene_depth`.
+    fn record<'r>(
+        &self,
+        r: &mut Recorder<'_>,
+        [hdr, depth]: [&'r Image; 2],
+        velocity: Option<&Image>,
+        each: impl Iterator<Item = (Vec<Resource<'r>>, Draw<'r>)>,
+    ) {
+        let images = std::iter::once(hdr).chain(velocity);
+        let attachments = Attachments {
+            colors: images.map(|image| color_attachment(image.view(), wgpu::LoadOp::Load)).collect(),
+            depth: if self.tests_depth { None } else { depth_attachment(depth.view(), wgpu::LoadOp::Load) },
+        };
+        let each = each.map(|(mut resources, draw)| {
+            resources.push(("scene_depth", depth.bound()));
+            (resources, draw)
+        });
+        r.draw_each(&self.kernels[usize::from(velocity.is_some())], attachments, each);
     }
 }

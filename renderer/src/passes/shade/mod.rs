@@ -75,6 +75,7 @@ use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder, texture};
 use crate::error::RenderError;
+use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::pixel_groups;
 use crate::scene::head::AUTHORED_SHIFT;
 use crate::scene::lamp::{GpuLight, Illumination};
@@ -267,6 +268,8 @@ pub(crate) struct Shade {
     samples_kernel: Option<Kernel>,
     /// Made by the first frame that shows a material of an author.
     authored_kernel: OnceLock<(Kernel, wgpu::TextureView)>,
+    /// Whether shadow maps are floats and no depth textures.
+    stored_shadows: bool,
     trilinear_repeat: wgpu::Sampler,
     linear_clamp: wgpu::Sampler,
     compare: wgpu::Sampler,
@@ -277,7 +280,9 @@ pub(crate) struct Shade {
 }
 
 impl Shade {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+    pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
+        let stored_shadows = rasteriser != Rasteriser::Hardware;
+        let program = program().flag("stored_shadows", stored_shadows);
         let linear = wgpu::SamplerDescriptor {
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
@@ -288,8 +293,9 @@ impl Shade {
         let specular = SpecularMethod::OneLobe;
         Self {
             directional_albedo: (specular, upload_directional_albedo(gpu, specular)),
-            kernel: Kernel::new(gpu, "shade", &program(), "shade"),
+            kernel: Kernel::new(gpu, "shade", &program, "shade"),
             samples_kernel: None,
+            stored_shadows,
             authored_kernel: OnceLock::new(),
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
                 label: Some("trilinear repeat"),
@@ -348,7 +354,8 @@ impl Shade {
         if heads.iter().all(|h| h.head.authored.is_none()) {
             return lit;
         }
-        let (kernel, ggx_albedo) = self.authored_kernel.get_or_init(|| authored_kernel(r.gpu));
+        let (kernel, ggx_albedo) =
+            self.authored_kernel.get_or_init(|| authored_kernel(r.gpu, self.stored_shadows));
         let authored = heads.iter().zip(&params).filter_map(|(h, params)| {
             let authored = h.head.authored.as_ref()?;
             let mut resources = resources(h, params);
@@ -363,8 +370,9 @@ impl Shade {
 
     /// Makes the resources of [`Shade::record_samples`].
     pub(crate) fn prepare_samples(&mut self, gpu: &Gpu) {
+        let program = samples_program().flag("stored_shadows", self.stored_shadows);
         self.samples_kernel
-            .get_or_insert_with(|| Kernel::new(gpu, "light samples", &samples_program(), "light_samples"));
+            .get_or_insert_with(|| Kernel::new(gpu, "light samples", &program, "light_samples"));
     }
 
     /// Diffuse light at `count` points of a head's surface.
@@ -417,10 +425,11 @@ impl Shade {
     }
 }
 
-fn authored_kernel(gpu: &Gpu) -> (Kernel, wgpu::TextureView) {
+fn authored_kernel(gpu: &Gpu, stored_shadows: bool) -> (Kernel, wgpu::TextureView) {
     let table = vec![vec![ggx_albedo::table()]];
     let table = texture::upload_half(gpu, "GGX albedo", ggx_albedo::SIZE, &table);
-    (Kernel::new(gpu, "shade authored", &authored_program(), "shade_authored"), table)
+    let program = authored_program().flag("stored_shadows", stored_shadows);
+    (Kernel::new(gpu, "shade authored", &program, "shade_authored"), table)
 }
 
 fn upload_directional_albedo(gpu: &Gpu, method: SpecularMethod) -> wgpu::TextureView {

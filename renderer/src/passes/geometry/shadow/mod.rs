@@ -15,6 +15,7 @@ use crate::device::wgsl::{Module, Program, module};
 use crate::device::{
     Attachments, Bind, Draw, Gpu, Image, ImageSpec, Raster, RasterKernel, Recorder, depth_attachment,
 };
+use crate::passes::geometry::raster::{ComputeRaster, Rasteriser, Sight};
 use crate::scene::PosedHead;
 use crate::scene::head::AUTHORED_SHIFT;
 use crate::scene::lamp::LightView;
@@ -32,15 +33,64 @@ pub(crate) fn cut_program() -> Program {
     Program::new(CUT_SHADER).constant("AUTHORED_SHIFT", AUTHORED_SHIFT)
 }
 
-/// The pipelines of the pass.
-pub(crate) struct Shadow {
+/// The pass.
+pub(crate) enum Shadow {
+    /// With the raster units of the device: depth textures.
+    Hardware(Hardware),
+    /// Without them, all lights at once: floats.
+    Compute(ComputeRaster),
+}
+
+impl Shadow {
+    pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
+        match rasteriser {
+            Rasteriser::Hardware => Self::Hardware(Hardware::new(gpu)),
+            Rasteriser::Compute { .. } => Self::Compute(ComputeRaster::new(gpu, "shadow", Sight::Lights)),
+        }
+    }
+
+    /// Makes what frames with a number of lights need.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, lights: usize, side: u32, has_holes: bool) {
+        if let Self::Compute(raster) = self {
+            raster.prepare(gpu, lights.max(1) as u64 * u64::from(side) * u64::from(side), has_holes);
+        }
+    }
+
+    /// Draws the opaque triangles of all heads as lights see them, one layer per light; one empty layer without lights.
+    pub(crate) fn record(
+        &self,
+        r: &mut Recorder<'_>,
+        lights: &[LightView],
+        heads: &[PosedHead<'_>],
+        side: u32,
+    ) -> Image {
+        match self {
+            Self::Hardware(hardware) => hardware.record(r, lights, heads, side),
+            Self::Compute(raster) => {
+                let clips: Vec<_> = lights.iter().map(|l| l.clip_from_world).collect();
+                raster.record_lights(r, &clips, heads, side)
+            }
+        }
+    }
+
+    /// Bytes that it keeps on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        match self {
+            Self::Hardware(_) => 0,
+            Self::Compute(raster) => raster.bytes(),
+        }
+    }
+}
+
+/// The pipelines that use raster units.
+pub(crate) struct Hardware {
     kernel: RasterKernel,
     /// For triangles with holes, made by the first frame that has such.
     cut_kernel: OnceLock<RasterKernel>,
 }
 
-impl Shadow {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+impl Hardware {
+    fn new(gpu: &Gpu) -> Self {
         let kernel = RasterKernel::new(
             gpu,
             &Raster {
@@ -49,15 +99,14 @@ impl Shadow {
                 vertex: "shadow_vertex",
                 fragment: None,
                 targets: &[],
-                nearer: wgpu::CompareFunction::Less,
+                nearer: Some(wgpu::CompareFunction::Less),
                 writes_depth: true,
             },
         );
         Self { kernel, cut_kernel: OnceLock::new() }
     }
 
-    /// Draws the opaque triangles of all heads as lights see them, one layer per light; one empty layer without lights.
-    pub(crate) fn record(
+    fn record(
         &self,
         r: &mut Recorder<'_>,
         lights: &[LightView],
@@ -110,7 +159,7 @@ fn cut_kernel(gpu: &Gpu) -> RasterKernel {
             vertex: "cut_vertex",
             fragment: Some("cut_fragment"),
             targets: &[],
-            nearer: wgpu::CompareFunction::Less,
+            nearer: Some(wgpu::CompareFunction::Less),
             writes_depth: true,
         },
     )

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! Theory: Burns and Hunt 2013, "The visibility buffer". The only rasterised pass of the frame that covers the head;
-//! its fragment shader stores one integer, everything else is compute (ARCHITECTURE.md has the measurement).
+//! its fragment shader stores one integer, everything else is compute (ARCHITECTURE.md has the measurement). Where
+//! compute is faster at that too, `raster` takes its place.
 //! Parts that keep a material with holes (alpha mask, or alpha that is cut at one half) are drawn after the others by a
 //! pipeline that reads their alpha; heads without such parts do not have it.
 //! Reversed infinite depth keeps 24 bits at any distance (Lapidous and Jiao 1999).
@@ -17,6 +18,7 @@ use crate::device::{
     Attachments, Bind, Draw, Gpu, Image, ImageSpec, Raster, RasterKernel, Recorder, color_attachment,
     depth_attachment,
 };
+use crate::passes::geometry::raster::{ComputeRaster, Rasteriser, Sight};
 use crate::scene::PosedHead;
 use crate::scene::head::AUTHORED_SHIFT;
 
@@ -41,15 +43,63 @@ pub(crate) fn cut_program() -> Program {
     Program::new(CUT_SHADER).constant("AUTHORED_SHIFT", AUTHORED_SHIFT)
 }
 
-/// The pipelines of the pass.
-pub(crate) struct Visibility {
+/// The pass.
+pub(crate) enum Visibility {
+    /// With the raster units of the device.
+    Hardware(Hardware),
+    /// Without them.
+    Compute(ComputeRaster),
+}
+
+impl Visibility {
+    pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
+        match rasteriser {
+            Rasteriser::Hardware => Self::Hardware(Hardware::new(gpu)),
+            Rasteriser::Compute { wide } => {
+                Self::Compute(ComputeRaster::new(gpu, "visibility", Sight::Camera { wide }))
+            }
+        }
+    }
+
+    /// Makes what frames of a size need.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, [width, height]: [u32; 2], has_holes: bool) {
+        if let Self::Compute(raster) = self {
+            raster.prepare(gpu, u64::from(width) * u64::from(height), has_holes);
+        }
+    }
+
+    /// Draws the opaque triangles of all heads: ids and depth.
+    pub(crate) fn record(
+        &self,
+        r: &mut Recorder<'_>,
+        view: &wgpu::Buffer,
+        heads: &[PosedHead<'_>],
+        size: [u32; 2],
+    ) -> [Image; 2] {
+        match self {
+            Self::Hardware(hardware) => hardware.record(r, view, heads, size),
+            Self::Compute(raster) => raster.record_camera(r, view, heads, size),
+        }
+    }
+
+    /// Bytes that it keeps on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        match self {
+            Self::Hardware(_) => 0,
+            Self::Compute(raster) => raster.bytes(),
+        }
+    }
+}
+
+/// The pipelines that use raster units.
+pub(crate) struct Hardware {
     kernel: RasterKernel,
     /// For triangles with holes, made by the first frame that has such.
     cut_kernel: OnceLock<RasterKernel>,
     is_numbered: bool,
 }
 
-impl Visibility {
+impl Hardware {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         Self::with_numbers(gpu, gpu.device.features().contains(wgpu::Features::PRIMITIVE_INDEX))
     }
@@ -65,15 +115,14 @@ impl Visibility {
                 vertex,
                 fragment: Some(fragment),
                 targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
-                nearer: wgpu::CompareFunction::Greater,
+                nearer: Some(wgpu::CompareFunction::Greater),
                 writes_depth: true,
             },
         );
         Self { kernel, cut_kernel: OnceLock::new(), is_numbered }
     }
 
-    /// Draws the opaque triangles of all heads: ids and depth.
-    pub(crate) fn record(
+    fn record(
         &self,
         r: &mut Recorder<'_>,
         view: &wgpu::Buffer,
@@ -134,7 +183,7 @@ fn cut_kernel(gpu: &Gpu) -> RasterKernel {
             vertex: "cut_vertex",
             fragment: Some("cut_fragment"),
             targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
-            nearer: wgpu::CompareFunction::Greater,
+            nearer: Some(wgpu::CompareFunction::Greater),
             writes_depth: true,
         },
     )
@@ -185,7 +234,7 @@ mod tests {
         view.jitter = [0.25, -0.25];
         let view = gpu.uniform("view", &view);
         let draw = |numbered| {
-            let pass = Visibility::with_numbers(gpu, numbered);
+            let pass = Hardware::with_numbers(gpu, numbered);
             let [ids, _] = recorded(gpu, |r| pass.record(r, &view, &heads, [64, 64]));
             read_image::<u32>(gpu, &ids)
         };

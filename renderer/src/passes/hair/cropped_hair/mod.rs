@@ -17,8 +17,9 @@ mod tests;
 
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Draw, Gpu, Image, Recorder};
+use crate::passes::geometry::raster::Rasteriser;
+use crate::passes::hair::Blended;
 use crate::passes::hair::fibre::{self, Fibre};
-use crate::passes::hair::{Blended, drawn_over};
 use crate::scene::PosedHead;
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
@@ -43,9 +44,9 @@ pub(crate) struct CroppedHair {
 }
 
 impl CroppedHair {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+    pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
         let entries = ["cropped_hair_vertex", "cropped_hair_fragment"];
-        Self { kernels: Blended::new(gpu, "cropped hair", &program(), entries) }
+        Self { kernels: Blended::new(gpu, rasteriser, "cropped hair", program(), entries) }
     }
 
     /// Draws the hairs of heads over a picture and, where there is one, over its motion.
@@ -83,6 +84,6 @@ impl CroppedHair {
             resources.extend(fibre.resources(&hair_light, light));
             (resources, Draw::Corners(h.head.hair_root_count * 3))
         });
-        r.draw_each(self.kernels.kernel(velocity), drawn_over(hdr, velocity, &seen.depth), each);
+        self.kernels.record(r, [hdr, &seen.depth], velocity, each);
     }
 }

@@ -18,8 +18,9 @@ use rubor_rig::head::Material;
 
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Draw, Gpu, Image, Recorder};
+use crate::passes::geometry::raster::Rasteriser;
+use crate::passes::hair::Blended;
 use crate::passes::hair::fibre::{self, Fibre};
-use crate::passes::hair::{Blended, drawn_over};
 use crate::scene::PosedHead;
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
@@ -49,9 +50,9 @@ pub(crate) struct Overlay {
 }
 
 impl Overlay {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+    pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
         let entries = ["overlay_vertex", "overlay_fragment"];
-        Self { kernels: Blended::new(gpu, "overlay", &program(), entries) }
+        Self { kernels: Blended::new(gpu, rasteriser, "overlay", program(), entries) }
     }
 
     /// Draws the blended triangles of heads over a picture and, where there is one, over its motion. `ambient` is the
@@ -95,6 +96,6 @@ impl Overlay {
             resources.extend(fibre.resources(&hair_light, light));
             (resources, Draw::Corners(h.head.overlay_triangles * 3))
         });
-        r.draw_each(self.kernels.kernel(velocity), drawn_over(hdr, velocity, &seen.depth), each);
+        self.kernels.record(r, [hdr, &seen.depth], velocity, each);
     }
 }
