@@ -10,7 +10,7 @@
 use glam::{Mat4, Vec3};
 use image::RgbImage;
 use rubor_renderer::channels::ChannelData;
-use rubor_renderer::settings::Settings;
+use rubor_renderer::settings::{RasterMethod, Settings};
 use rubor_renderer::{
     AdapterDescription, Camera, ColorTable, Environment, FrameStats, FrameTimes, Gpu, HeadInstance,
     HeadOnGpu, Image, Light, LightKind, Renderer, Scene, native,
@@ -53,6 +53,8 @@ pub struct Studio {
     heads: Vec<HeadOnGpu>,
     surroundings: Surroundings,
     notes: Vec<Note>,
+    /// Whether what turns triangles into pixels was chosen for these heads.
+    raster_is_chosen: bool,
 }
 
 /// The last environment by its name: a rotated one is the same map at another angle.
@@ -94,7 +96,7 @@ impl Studio {
     pub fn open(adapter: Option<&str>) -> Outcome<Self> {
         let renderer = Renderer::new(open_device(adapter)?)?;
         let skin = SkinModel::new(&ChromophoreModel::default()).bake(COLOR_TABLE_SIDE, COLOR_TABLE_SIDE);
-        Ok(Self { renderer, skin, heads: Vec::new(), surroundings: None, notes: Vec::new() })
+        Ok(Self { renderer, skin, heads: Vec::new(), surroundings: None, notes: Vec::new(), raster_is_chosen: false })
     }
 
     /// The device.
@@ -122,6 +124,7 @@ impl Studio {
         let heads: Result<_, _> =
             heads.into_iter().map(|head| HeadOnGpu::new(self.renderer.gpu(), head, &color)).collect();
         self.heads = heads?;
+        self.raster_is_chosen = false;
         Ok(())
     }
 
@@ -150,6 +153,7 @@ impl Studio {
     /// # Errors
     /// No shot, or another number than there are heads; environments that do not load; errors of the renderer.
     pub fn draw(&mut self, shots: &[Shot], spacing_m: f32, settings: &Settings) -> Outcome<Drawn> {
+        self.choose_raster(shots, spacing_m, settings)?;
         let gpu = self.renderer.gpu().clone();
         let frame = self.with_scene(shots, spacing_m, |renderer, scene| {
             Ok(native::wait(&gpu, renderer.draw_any(scene, settings))?)
@@ -184,10 +188,24 @@ impl Studio {
         frames: u32,
     ) -> Outcome<Vec<FrameTimes>> {
         let shots = std::slice::from_ref(shot);
+        self.choose_raster(shots, 0.0, settings)?;
         let gpu = self.renderer.gpu().clone();
         self.with_scene(shots, 0.0, |renderer, scene| {
             Ok(native::wait(&gpu, renderer.measure(scene, settings, warm_up, frames))?)
         })
+    }
+
+    /// Measures once what turns the triangles of these heads into pixels faster, if the settings leave it open.
+    fn choose_raster(&mut self, shots: &[Shot], spacing_m: f32, settings: &Settings) -> Outcome {
+        if self.raster_is_chosen || settings.quality.raster != RasterMethod::Auto {
+            return Ok(());
+        }
+        let gpu = self.renderer.gpu().clone();
+        self.with_scene(shots, spacing_m, |renderer, scene| {
+            Ok(native::wait(&gpu, renderer.choose_raster(scene, settings))?)
+        })?;
+        self.raster_is_chosen = true;
+        Ok(())
     }
 
     fn with_scene<T>(
