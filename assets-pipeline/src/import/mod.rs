@@ -2,6 +2,7 @@
 
 pub mod capture;
 pub(crate) mod eye_projection;
+pub mod file;
 pub mod gltf;
 pub mod makehuman;
 pub mod materials;
@@ -12,4 +13,6 @@ mod obj_match;
 pub mod obj_set;
 pub mod picture;
 mod tiles;
+pub mod usd;
+mod usd_materials;
 pub mod usda;

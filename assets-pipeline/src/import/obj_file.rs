@@ -17,7 +17,20 @@ use crate::poly::build_head;
 /// # Errors
 /// As [`obj::read`].
 pub fn read(path: &Path) -> Result<ImportedHead, ImportError> {
-    let file = obj::read(path, GroupBy::Material)?;
+    let bytes = std::fs::read(path).map_err(ImportError::read(path))?;
+    from_bytes(&bytes, path)
+}
+
+/// Reads from memory; `path` is for messages and finds the files of materials.
+///
+/// # Errors
+/// As [`read`].
+pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError> {
+    let file = obj::from_bytes(bytes, path, GroupBy::Material)?;
+    if file.mesh.face_count() == 0 {
+        let found = format!("{} positions and no faces", file.mesh.points.len());
+        return Err(ImportError::content(path, "end of file", found, "a mesh"));
+    }
     let mut notes = Notes::default();
     for note in file.notes {
         match note.places.is_empty() {

@@ -96,6 +96,18 @@ impl Units {
     }
 }
 
+impl std::fmt::Display for Units {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Millimetres => "millimetres",
+            Self::Centimetres => "centimetres",
+            Self::Decimetres => "decimetres",
+            Self::Metres => "metres",
+            Self::Inches => "inches",
+        })
+    }
+}
+
 impl std::str::FromStr for Units {
     type Err = String;
 
