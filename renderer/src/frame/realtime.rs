@@ -18,13 +18,14 @@ pub(crate) fn record(
     frame.pose(r);
     let light = frame.light(r);
     if frame.needs.before_view {
-        diffusion.before_view(r, &frame.before(r, &light));
+        let before = frame.before(r, &light);
+        diffusion.before_view(r, &before);
     }
 
     let mut samples = Samples::default();
     for subsample in frame.subsamples() {
         let seen = frame.see(r, subsample);
-        let lit = frame.shade(r, &light, &seen, &samples);
+        let lit = frame.shade(r, &light, &seen, &samples, diffusion.skin_light());
         let diffuse = diffusion.after_shading(r, &frame.heads, &seen, &lit);
         frame.show(r, &light, seen, lit, &diffuse, &mut samples);
     }
