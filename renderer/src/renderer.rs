@@ -457,12 +457,13 @@ impl Renderer {
         Ok(Drawn { gpu: self.gpu.clone(), submission, picture, times, stats, channels })
     }
 
-    /// Bytes of heads, buffers and images.
+    /// Bytes of heads, buffers and images, and what the diffusion method keeps.
     fn memory_bytes(&self, scene: &Scene<'_>) -> u64 {
         self.images.bytes()
             + self.instances.iter().map(Instance::bytes).sum::<u64>()
             + self.passes.visibility.bytes()
             + self.passes.shadow.bytes()
+            + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
             + self.past.history.as_ref().map_or(0, History::memory_bytes)
             + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()

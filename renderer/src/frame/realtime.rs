@@ -25,7 +25,7 @@ pub(crate) fn record(
     let mut samples = Samples::default();
     for subsample in frame.subsamples() {
         let seen = frame.see(r, subsample);
-        let lit = frame.shade(r, &light, &seen, &samples);
+        let lit = frame.shade(r, &light, &seen, &samples, diffusion.skin_light());
         let diffuse = diffusion.after_shading(r, &frame.heads, &seen, &lit);
         frame.show(r, &light, seen, lit, &diffuse, &mut samples);
     }

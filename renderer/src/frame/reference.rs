@@ -43,7 +43,7 @@ pub(crate) async fn draw(
     let mut samples = Samples::default();
     for subsample in frame.subsamples() {
         let seen = frame.see(r, subsample);
-        let lit = frame.shade(r, &light, &seen, &samples);
+        let lit = frame.shade(r, &light, &seen, &samples, None);
         let integral = Surface::new(r.gpu, &frame.settings.quality.profile, size);
         let lighting = Lighting {
             light: &light,
@@ -51,6 +51,7 @@ pub(crate) async fn draw(
             first: None,
             transmittance: None,
             quality: &frame.settings.quality,
+            skin_light: None,
         };
         for (head, skin) in frame.heads.iter().zip(&skins) {
             for batch in 0..batches {

@@ -6,7 +6,7 @@ use crate::device::{Image, ImageSpec, Recorder};
 use crate::error::RenderError;
 use crate::passes::antialias::{self, History, Subsample};
 use crate::passes::diffusion::Before;
-use crate::passes::shade::{Lighting, Lit};
+use crate::passes::shade::{Lighting, Lit, SkinLight};
 use crate::scene::lamp::{Illumination, place_lights};
 use crate::scene::placement::{average_light, receivers};
 use crate::scene::view::{Seen, View, pixels_per_mm, view};
@@ -84,17 +84,18 @@ impl<'a> Frame<'a> {
     }
 
     /// Light of the surface that a sample sees. A second sample reuses the light of the first where both see the same
-    /// surface.
+    /// surface. `skin_light` is the rule of a diffusion method for skin.
     pub(crate) fn shade(
         &self,
         r: &mut Recorder<'_>,
         light: &Illumination<'_>,
         seen: &Seen,
         samples: &Samples,
+        skin_light: Option<&dyn SkinLight>,
     ) -> Lit {
         let transmittance = self.passes.transmittance.as_ref().map(|(_, t)| t);
         let first = samples.seen.first();
-        let lighting = Lighting { light, seen, first, transmittance, quality: &self.settings.quality };
+        let lighting = Lighting { light, seen, first, transmittance, quality: &self.settings.quality, skin_light };
         self.passes.shade.record(r, &lighting, &self.heads, samples.lit.as_ref())
     }
 

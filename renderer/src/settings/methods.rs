@@ -322,6 +322,10 @@ groups! {
     ScatterMethod, "scatter", "Subsurface scattering" {
         /// Light leaves skin where it enters.
         None, "none", Nowhere, "";
+        /// Light looked up over the cosine to the lamp, curvature and shadow, with N blurred maps of slopes: one for the
+        /// three channels of light, or one for each.
+        PreIntegrated(n: Number::every(2, 1, 3, Some(3), "blurred maps of slopes")), "pre-integrated", Shading,
+            "Penner and Borshukov 2011";
         /// Two passes of one kernel of N taps that follows the surface.
         Separable(n: Number::every(2, 5, 65, None, "taps")), "separable", AfterShading,
             "Jimenez et al. 2015; Jimenez 2012 ch. 6";
@@ -343,6 +347,13 @@ groups! {
         None, "none", Nowhere, "";
         /// Thickness from shadow maps, light from the integral of the profile over what the lamp shines on.
         ShadowDepth, "shadow-depth", Shading, "Jimenez et al. 2010; Jimenez 2012 ch. 5";
+    }
+    /// Where methods that need the curvature of the skin take it from.
+    CurvatureMethod, "curvature", "Curvature of the skin" {
+        /// Both principal curvatures of the deformed mesh, smoothed over neighbouring points.
+        Mesh, "mesh", BeforeView, "least squares over the normals around a point; see Rusinkiewicz 2004";
+        /// How fast normal and place change from pixel to pixel: one curvature for each triangle, whose edges may show.
+        Screen, "screen", Shading, "Penner and Borshukov 2011";
     }
     /// Whether the blood of a face moves.
     ColorMethod, "color", "Colour of skin" {
@@ -447,7 +458,8 @@ mod tests {
         check::<RasterMethod>(&RasterMethod::GROUP);
         check::<AntialiasMethod>(&AntialiasMethod::GROUP);
         check::<ToneMap>(&ToneMap::GROUP);
-        assert_eq!(GROUPS.len(), 8, "a new group is checked above");
+        check::<CurvatureMethod>(&CurvatureMethod::GROUP);
+        assert_eq!(GROUPS.len(), 9, "a new group is checked above");
         assert_eq!(ScatterMethod::all().count(), ScatterMethod::GROUP.methods.len());
         assert_eq!("reference-surface".parse(), Ok(ScatterMethod::ReferenceSurface(64)));
     }

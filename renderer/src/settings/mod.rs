@@ -30,8 +30,8 @@ use crate::channels::Channel;
 pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
-    AntialiasMethod, ColorMethod, GROUPS, Group, Method, RasterMethod, ScatterMethod, SpecularMethod, Stage,
-    ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
+    AntialiasMethod, ColorMethod, CurvatureMethod, GROUPS, Group, Method, RasterMethod, ScatterMethod, SpecularMethod,
+    Stage, ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
 
@@ -72,6 +72,8 @@ pub struct Quality {
     pub scatter: ScatterMethod,
     /// How light passes through thin parts
     pub transmit: TransmitMethod,
+    /// Where pre-integrated scattering takes the curvature of the skin from
+    pub curvature: CurvatureMethod,
     /// Whether the blood of a face moves
     pub color: ColorMethod,
     /// How wrinkles join the relief of the skin
@@ -148,6 +150,7 @@ impl Default for Quality {
         Self {
             scatter: ScatterMethod::Separable(17),
             transmit: TransmitMethod::ShadowDepth,
+            curvature: CurvatureMethod::Mesh,
             color: ColorMethod::Hemoglobin,
             wrinkles: WrinkleMethod::PartialDerivative,
             specular: SpecularMethod::OneLobe,

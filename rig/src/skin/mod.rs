@@ -32,6 +32,7 @@ pub mod medium;
 pub mod model;
 pub mod monte_carlo;
 pub(crate) mod numerics;
+pub mod preintegrated;
 pub mod profile;
 pub mod report;
 pub mod table;

@@ -3,12 +3,14 @@
 //! ```text
 //! needs --------> inputs that the frame prepares: backs of the heads, a margin around the picture, transmittance
 //! before_view --> maps of a head, light on all of its surface; only for methods that ask for it
+//! skin_light ---> the rule by which `shade` lights skin, with its tables and maps
 //! after_shading -> diffuse radiance from images of the lit surface
 //! ```
 //!
 //! The frame calls the stages and knows no method. A method is a folder here, a row in [`crate::settings::methods`] and
 //! an arm of the `match` in [`method`], which the compiler enforces.
 
+pub(crate) mod preintegrated;
 pub(crate) mod screen;
 pub(crate) mod surface;
 
@@ -18,7 +20,7 @@ use rubor_rig::skin::profile::Profile;
 
 use crate::device::{Gpu, Image, Recorder};
 use crate::error::RenderError;
-use crate::passes::shade::{Lit, Shade, Transmittance};
+use crate::passes::shade::{Lit, Shade, SkinLight, Transmittance};
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
 use crate::scene::{PosedHead, Scene};
@@ -68,6 +70,16 @@ pub(crate) trait Diffusion {
     /// with [`Needs::before_view`].
     fn before_view(&mut self, _r: &mut Recorder<'_>, _frame: &Before<'_>) {}
 
+    /// How skin is lit for it; `None` for Lambert's law.
+    fn skin_light(&self) -> Option<&dyn SkinLight> {
+        None
+    }
+
+    /// Bytes that it keeps on the device from frame to frame.
+    fn memory_bytes(&self) -> u64 {
+        0
+    }
+
     /// Diffuse radiance of a white surface from images of its light.
     fn after_shading(
         &mut self,
@@ -97,6 +109,7 @@ pub(crate) fn method(
     use screen::{disk, exact, gauss, jitter, separable};
     Ok(Some(match method.validate()? {
         ScatterMethod::None => Box::new(Unscattered),
+        ScatterMethod::PreIntegrated(n) => Box::new(preintegrated::PreIntegrated::new(gpu, profile, n)?),
         ScatterMethod::Separable(n) => Box::new(separable::Separable::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenGauss(n) => Box::new(gauss::ScreenGauss::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenJitter => Box::new(jitter::gather(gpu, profile)),

@@ -49,6 +49,9 @@
 //! The iris is lit as the bowl on which the cornea gathers light, brightest opposite to a lamp's reflection; pigment,
 //! vessels, caruncle, papillae and patches of the lining are noise of texture coordinates, made for the default head.
 //!
+//! A diffusion method may light skin by a rule of its own ([`SkinLight`]): a variant of the kernel with the module
+//! `package::skin_light` that the method brings. Without one nothing of it is compiled.
+//!
 //! Parts that keep the material of their author (`authored.wesl`) have a dispatch of their own, which heads without such
 //! parts do not have: metallic-roughness of glTF 2.0, appendix B (GGX, Smith, Schlick, Lambert), lamps and shadows as for
 //! skin, the environment by a table (`ggx_albedo`). It does not cull backs of single-sided parts.
@@ -110,6 +113,20 @@ pub(crate) fn samples_program() -> Program {
 /// The shader of the pass that lights what keeps the material of its author.
 pub(crate) fn authored_program() -> Program {
     with_constants(Program::new(AUTHORED_SHADER).with(&[SHADER]))
+}
+
+/// The shader of the pass with a rule for skin: `modules` hold `package::skin_light`.
+pub(crate) fn skin_light_program(modules: &[Module]) -> Program {
+    program().with(modules).flag("skin_light", true)
+}
+
+/// A rule by which lamps and sky light skin, in place of Lambert's law.
+pub(crate) trait SkinLight {
+    /// Entry point `shade` of a [`skin_light_program`].
+    fn kernel(&self) -> &Kernel;
+
+    /// What its module binds for a head, and what replaces resources of the pass by their names.
+    fn resources<'a>(&'a self, head: &PosedHead<'a>) -> Vec<Resource<'a>>;
 }
 
 fn with_constants(program: Program) -> Program {
@@ -247,6 +264,8 @@ pub(crate) struct Lighting<'a> {
     pub(crate) first: Option<&'a Seen>,
     pub(crate) transmittance: Option<&'a Transmittance>,
     pub(crate) quality: &'a Quality,
+    /// The rule that lights skin on visible surfaces; `None` for Lambert's law.
+    pub(crate) skin_light: Option<&'a dyn SkinLight>,
 }
 
 /// Light of the visible surfaces.
@@ -338,7 +357,8 @@ impl Shade {
         let params: Vec<_> = heads.iter().map(|h| r.uniform("shade", &params(lighting, h))).collect();
         let first = lighting.first.unwrap_or(lighting.seen);
         let resources = |h, params| {
-            let mut resources = self.resources(lighting, h, params);
+            let mut resources = lighting.skin_light.map_or_else(Vec::new, |rule| rule.resources(h));
+            resources.extend(self.resources(lighting, h, params));
             resources.extend([
                 ("depth", lighting.seen.depth.bound()),
                 ("first_visible", first.ids.bound()),
@@ -350,7 +370,7 @@ impl Shade {
             resources
         };
         let each = heads.iter().zip(&params).map(|(h, params)| (resources(h, params), pixel_groups(size)));
-        r.dispatch_each(&self.kernel, each);
+        r.dispatch_each(lighting.skin_light.map_or(&self.kernel, SkinLight::kernel), each);
         if heads.iter().all(|h| h.head.authored.is_none()) {
             return lit;
         }
