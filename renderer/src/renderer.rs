@@ -15,7 +15,7 @@ use crate::passes::diffusion::{Needs, Prepared, surface};
 use crate::scene::lamp::lamps;
 use crate::scene::posed_head::{Instance, posed};
 use crate::scene::{MAX_HEADS, MAX_LIGHTS, Scene};
-use crate::settings::{ScatterMethod, Settings};
+use crate::settings::{ScatterMethod, Settings, TransmitMethod};
 
 /// A picture, rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -339,6 +339,9 @@ impl Renderer {
             }
         }
         self.diffusion.prepare(&self.gpu, settings.quality.scatter, settings.quality.profile.shared())?;
+        if let Some(method) = &mut self.diffusion.method {
+            method.take_heads(&self.gpu, scene.heads)?;
+        }
         let needs = self.needs();
         self.passes.prepare(&self.gpu, settings, &needs)
     }
@@ -402,6 +405,7 @@ impl Renderer {
     fn memory_bytes(&self, scene: &Scene<'_>) -> u64 {
         self.images.bytes()
             + self.instances.iter().map(Instance::bytes).sum::<u64>()
+            + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
             + self.past.history.as_ref().map_or(0, History::memory_bytes)
             + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()
@@ -417,7 +421,7 @@ fn frame<'a>(
     needs: Needs,
     into: Option<&'a wgpu::TextureView>,
 ) -> Frame<'a> {
-    let transmits = passes.transmittance.is_some();
+    let transmits = needs.transmittance && settings.quality.transmit != TransmitMethod::None;
     Frame {
         passes,
         scene,

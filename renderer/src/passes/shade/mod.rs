@@ -111,6 +111,12 @@ pub(crate) fn authored_program() -> Program {
     with_constants(Program::new(AUTHORED_SHADER).with(&[SHADER]))
 }
 
+/// A shader that imports from this pass; `flag` turns on variants of it.
+pub(crate) fn importing(root: Module, flag: Option<&'static str>) -> Program {
+    let program = Program::new(root).with(&[SHADER]);
+    with_constants(flag.into_iter().fold(program, |p, f| p.flag(f, true)))
+}
+
 fn with_constants(program: Program) -> Program {
     program
         .with(&PARTS)
@@ -384,7 +390,7 @@ impl Shade {
     }
 
     /// Bindings of the light on a head, for pixels or points.
-    fn resources<'a>(
+    pub(crate) fn resources<'a>(
         &'a self,
         lighting: &Lighting<'a>,
         posed: &PosedHead<'a>,
@@ -429,7 +435,7 @@ fn upload_directional_albedo(gpu: &Gpu, method: SpecularMethod) -> wgpu::Texture
 }
 
 /// Numbers of the pass for one head.
-fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
+pub(crate) fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
     let maps = posed.head.maps.as_ref();
     let quality = lighting.quality;
     let hemoglobin_scale = match quality.color {
