@@ -86,12 +86,10 @@ pub struct Quality {
     pub antialias_patterns: AntialiasPatterns,
     /// How far light goes in skin, for every scattering method
     pub profile: DiffusionProfile,
-    /// Share of the skin's colour that light takes on before texture-space scatters it: 0 blurs light and 1 also the
-    /// colour, which is right for a map of what the skin's blood and melanin are, not of how it looks
+    /// Share of the skin's colour that texture-space gives to light before it scatters; 0 leaves all of it for after
     #[schemars(range(min = 0, max = 1))]
     pub pre_scatter: f32,
-    /// Savings of texture-space: culled leaves out skin that faces away, sized draws smaller maps of distant heads, clipped
-    /// leaves out skin outside of the picture
+    /// What texture-space leaves out: culled skin faces away, sized texels are under a pixel, clipped skin is out of view
     pub map_savings: Vec<MapSaving>,
     /// Texels on a side of a shadow map
     #[schemars(range(min = 16, max = 16384))]
