@@ -37,6 +37,18 @@ pub enum RenderError {
     /// The head breaks a rule of [`rubor_rig::head::Head`].
     #[error(transparent)]
     Head(#[from] rubor_rig::error::HeadError),
+    /// A scattering method cannot draw a head.
+    #[error("{method} cannot draw head {head}: {reason}; these scattering methods can: {others}")]
+    Unsuited {
+        /// Name of the method.
+        method: String,
+        /// Number of the head in the scene, from 1.
+        head: usize,
+        /// The property of the head that is in the way.
+        reason: String,
+        /// Names of methods that do not need it.
+        others: String,
+    },
     /// Antialiasing settings out of range.
     #[error(transparent)]
     Antialias(#[from] AntialiasError),

@@ -16,7 +16,7 @@ use crate::passes::geometry::raster::Rasteriser;
 use crate::scene::lamp::lamps;
 use crate::scene::posed_head::{Instance, posed};
 use crate::scene::{MAX_HEADS, MAX_LIGHTS, Scene};
-use crate::settings::{RasterMethod, ScatterMethod, Settings};
+use crate::settings::{RasterMethod, ScatterMethod, Settings, TransmitMethod};
 
 /// A picture, rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -385,6 +385,9 @@ impl Renderer {
         if self.passes.rasteriser != rasteriser {
             self.passes = Passes::new(&self.gpu, rasteriser);
         }
+        if let Some(method) = &mut self.diffusion.method {
+            method.take_heads(&self.gpu, scene.heads)?;
+        }
         let needs = self.needs();
         self.passes.prepare(&self.gpu, scene, settings, &needs)
     }
@@ -479,7 +482,7 @@ fn frame<'a>(
     needs: Needs,
     into: Option<&'a wgpu::TextureView>,
 ) -> Frame<'a> {
-    let transmits = passes.transmittance.is_some();
+    let transmits = needs.transmittance && settings.quality.transmit != TransmitMethod::None;
     Frame {
         passes,
         scene,

@@ -20,6 +20,7 @@
 //! assert_eq!(FaceState::neutral(&head).hemoglobin_scale, 1.0);
 //! ```
 
+pub mod atlas;
 pub mod authored;
 pub mod bind;
 pub mod color;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rubor_rig::atlas::{Atlas, AtlasError, Islands, MOST_OVERLAP, Skin, shared_texels};
 use rubor_rig::head::{Head, Material};
 use rubor_rig::names::{ARKIT, Key, Resolver, canonical, is_known_shape, nearest, vocabulary};
 
@@ -98,13 +99,64 @@ fn triangles(head: &Head, findings: &mut Vec<Finding>) {
     });
     let uvs: Vec<glam::Vec2> = corners.map(|v| mesh.vertices[*v as usize].uv).collect();
     if !uvs.is_empty() && uvs.iter().all(|uv| *uv == uvs[0]) {
-        let message = "the skin has no texture coordinates: every map shows one texel";
+        let message = "the skin has no texture coordinates: every map shows one texel, texture-space cannot scatter";
         findings.push(Finding::warning("mesh", message).fix("unwrap the mesh before import"));
-    } else if uvs.iter().any(|uv| uv.min_element() < -1e-4 || uv.max_element() > 1.0001) {
+        return;
+    }
+    findings.extend(layout(head));
+    if uvs.iter().any(|uv| uv.min_element() < -1e-4 || uv.max_element() > 1.0001) {
         let message =
             "texture coordinates of the skin leave 0 to 1: maps repeat there, low-resolution ones do not";
         findings.push(Finding::warning("mesh", message).fix("keep the skin in one tile"));
     }
+}
+
+/// Texels on a side on which layouts are looked at.
+const LAYOUT_SIDE: u32 = 512;
+/// Share of texels that more than one place of the skin may use: rounding at borders of islands.
+const SHARED_TEXELS: f64 = 0.002;
+
+/// What is wrong with the layout of the skin in the texture.
+pub fn layout(head: &Head) -> Vec<Finding> {
+    let mesh = &head.mesh;
+    let skin = mesh.parts.iter().filter(|p| p.material == Material::Skin);
+    let triangles: Vec<[u32; 3]> = (skin.flat_map(|p| p.triangles.clone()))
+        .map(|t| mesh.triangles[t as usize])
+        .collect();
+    let skin = Skin { points: &mesh.points, vertices: &mesh.vertices, triangles: &triangles };
+    let islands = match Islands::new(&skin) {
+        Ok(islands) => islands,
+        Err(AtlasError::NoSkin) => return Vec::new(),
+        Err(e) => {
+            let message = format!("its layout in the texture cannot be used by texture-space: {e}");
+            return vec![Finding::warning("mesh", message).fix("unwrap the skin before import")];
+        }
+    };
+    let mut findings = Vec::new();
+    let shared = shared_texels(&skin, LAYOUT_SIDE);
+    if shared > SHARED_TEXELS {
+        let mirrored = match islands.mirrored() {
+            0 => String::new(),
+            n => format!(" ({n} of {} islands are mirrored)", islands.count),
+        };
+        let message = format!(
+            "{:.1} % of the texels of the skin belong to several places{mirrored}: blood, wrinkles and pigment show in all of them",
+            100.0 * shared
+        );
+        findings.push(Finding::warning("mesh", message).fix("give every place of the skin texels of its own"));
+    }
+    // The reach of light in skin; the margin does not matter here.
+    if let Ok(atlas) = Atlas::new(&skin, LAYOUT_SIDE, 8.0)
+        && atlas.overlap > 0.0
+    {
+        let message = format!(
+            "{:.1} % of the skin lies under other skin of the same island of the texture: texture-space refuses heads from {:.0} % on and shows wrong light below",
+            100.0 * atlas.overlap,
+            100.0 * MOST_OVERLAP
+        );
+        findings.push(Finding::warning("mesh", message).fix("unfold the island, or cut it"));
+    }
+    findings
 }
 
 fn shapes(head: &Head, findings: &mut Vec<Finding>) {

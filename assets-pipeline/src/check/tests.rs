@@ -149,6 +149,22 @@ fn heads_of_wrong_size_shape_and_name() {
 }
 
 #[test]
+fn layouts_of_the_texture() {
+    let messages = |head: &Head| head::layout(head).iter().map(ToString::to_string).collect::<Vec<_>>();
+    assert_eq!(messages(&good()), [""; 0]);
+    // The second triangle on the texels of the first, mirrored about the edge that they share.
+    let mut mirrored = good();
+    mirrored.mesh.vertices[3].uv = mirrored.mesh.vertices[1].uv;
+    let found = messages(&mirrored);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(found[0].contains("100.0 % of the texels") && found[0].contains("1 of 2 islands are mirrored"), "{found:?}");
+    let mut bare = good();
+    bare.mesh.vertices[3].uv = 0.5 * (bare.mesh.vertices[0].uv + bare.mesh.vertices[2].uv);
+    let found = messages(&bare);
+    assert!(found[0].contains("50 % of its skin have no texture coordinates"), "{found:?}");
+}
+
+#[test]
 fn rigs_and_sequences_say_what_has_no_effect() {
     let head = good();
     let rig =

@@ -135,7 +135,7 @@ impl Passes {
             self.antialias = Some(Antialias::new(gpu, &wanted, size, format)?);
         }
         let profile = settings.quality.profile.shared();
-        if settings.quality.transmit == TransmitMethod::None || !needs.transmittance {
+        if settings.quality.transmit != TransmitMethod::ShadowDepth || !needs.transmittance {
             self.transmittance = None;
         } else if self.transmittance.as_ref().is_none_or(|(p, _)| p != profile) {
             self.transmittance = Some((profile.clone(), Transmittance::new(gpu, profile)?));

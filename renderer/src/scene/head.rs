@@ -1,8 +1,10 @@
 //! A head on the device: geometry for the kernels, maps as textures. Never changes after upload.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange};
+use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange, Vertex};
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, resize_area};
 use wgpu::util::DeviceExt;
@@ -80,8 +82,19 @@ pub struct HeadOnGpu {
     pub(crate) mm_per_texture: f32,
     /// Bounds of its opaque parts.
     pub(crate) clusters: Vec<Cluster>,
+    /// Its opaque surface at rest, for methods that lay it out.
+    pub(crate) surface: Arc<Surface>,
     /// Bytes of buffers and textures on the device.
     pub memory_bytes: u64,
+}
+
+/// The opaque surface of a head at rest, on the host.
+pub(crate) struct Surface {
+    /// Metres.
+    pub(crate) points: Vec<Vec3>,
+    pub(crate) vertices: Vec<Vertex>,
+    /// Three vertices and the number of the material, in the order of the device's list.
+    pub(crate) triangles: Vec<[u32; 4]>,
 }
 
 pub(crate) struct MapsOnGpu {
@@ -166,6 +179,11 @@ impl HeadOnGpu {
             bounds,
             mm_per_texture: mm_per_texture(head),
             clusters: clusters(head),
+            surface: Arc::new(Surface {
+                points: mesh.points.clone(),
+                vertices: mesh.vertices.clone(),
+                triangles: triangles[..opaque as usize].to_vec(),
+            }),
             memory_bytes: 0,
         };
         result.memory_bytes = result.count_bytes();

@@ -182,7 +182,7 @@ mod tests {
             let text = match &leaf.default {
                 Value::String(text) => text.clone(),
                 Value::Array(all) if leaf.flag() == "size" => format!("{}x{}", all[0], all[1]),
-                Value::Array(_) => String::new(),
+                Value::Array(all) => all.iter().filter_map(Value::as_str).collect::<Vec<_>>().join(","),
                 other => other.to_string(),
             };
             assert_eq!(leaf.parse(&text), Ok(leaf.default.clone()), "{}", leaf.name());

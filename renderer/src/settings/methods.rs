@@ -326,6 +326,9 @@ groups! {
         /// three channels of light, or one for each.
         PreIntegrated(n: Number::every(2, 1, 3, Some(3), "blurred maps of slopes")), "pre-integrated", Shading,
             "Penner and Borshukov 2011";
+        /// Six Gaussians over a map of the light on all of the skin, N texels on a side.
+        TextureSpace(n: Number::every(64, 64, 4096, Some(1024), "texels on a side of the map of light")),
+            "texture-space", BeforeView, "d'Eon and Luebke 2007; Jimenez 2012 ch. 3";
         /// Two passes of one kernel of N taps that follows the surface.
         Separable(n: Number::every(2, 5, 65, None, "taps")), "separable", AfterShading,
             "Jimenez et al. 2015; Jimenez 2012 ch. 6";
@@ -347,6 +350,8 @@ groups! {
         None, "none", Nowhere, "";
         /// Thickness from shadow maps, light from the integral of the profile over what the lamp shines on.
         ShadowDepth, "shadow-depth", Shading, "Jimenez et al. 2010; Jimenez 2012 ch. 5";
+        /// Thickness and the place nearest to the lamp, blurred light from there; only with texture-space.
+        TranslucentShadowMap, "translucent-shadow-map", BeforeView, "d'Eon and Luebke 2007; Lee, Realistic Skin Rendering";
     }
     /// Where methods that need the curvature of the skin take it from.
     CurvatureMethod, "curvature", "Curvature of the skin" {

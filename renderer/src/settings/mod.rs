@@ -90,9 +90,32 @@ pub struct Quality {
     pub antialias_patterns: AntialiasPatterns,
     /// How far light goes in skin, for every scattering method
     pub profile: DiffusionProfile,
+    /// Share of the skin's colour that texture-space gives to light before it scatters; 0 leaves all of it for after
+    #[schemars(range(min = 0, max = 1))]
+    pub pre_scatter: f32,
+    /// What texture-space leaves out: culled skin faces away, sized texels are under a pixel, clipped skin is out of view
+    pub map_savings: Vec<MapSaving>,
     /// Texels on a side of a shadow map
     #[schemars(range(min = 16, max = 16384))]
     pub shadow_size: u32,
+}
+
+/// What texture-space need not light and blur (Jimenez 2012 ch. 3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
+pub enum MapSaving {
+    /// Skin that faces away from the camera by more than 105 degrees.
+    Culled,
+    /// Texels smaller than a pixel of the nearest part of the head: the map is halved until they are not.
+    Sized,
+    /// Skin so far outside of the picture that no light scatters in.
+    Clipped,
+}
+
+impl MapSaving {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Culled, Self::Sized, Self::Clipped];
 }
 
 /// How the light of a frame becomes a picture.
@@ -159,6 +182,8 @@ impl Default for Quality {
             antialias_preset: AntialiasPreset::High,
             antialias_patterns: AntialiasPatterns::Revised,
             profile: DiffusionProfile::default(),
+            pre_scatter: 0.0,
+            map_savings: MapSaving::ALL.to_vec(),
             shadow_size: 2048,
         }
     }
@@ -242,6 +267,14 @@ impl Settings {
     pub fn validate(&self) -> Result<(), SettingsError> {
         self.quality.scatter.validate().map_err(|e| out_of_range("quality.scatter", e))?;
         self.quality.antialias.validate().map_err(|e| out_of_range("quality.antialias", e))?;
+        let (scatter, transmit) = (self.quality.scatter, self.quality.transmit);
+        if transmit == TransmitMethod::TranslucentShadowMap && !matches!(scatter, ScatterMethod::TextureSpace(_)) {
+            return Err(SettingsError::Range {
+                setting: "quality.transmit".into(),
+                found: format!("{transmit} with {scatter}, which has no map of the light on all of the skin"),
+                expected: "shadow-depth or none, or scatter texture-space".into(),
+            });
+        }
         if !self.look.exposure.is_finite() {
             return Err(SettingsError::Range {
                 setting: "look.exposure".into(),

@@ -253,6 +253,11 @@ pub(crate) fn finish_with(
         return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
     }
     name_parts(&mut head, &common.parts)?;
+    let layout = rubor_assets::check::head::layout(&head).into_iter().map(|f| {
+        let fix = f.fix.map(|fix| format!("; {fix}")).unwrap_or_default();
+        Note::new(path.display().to_string(), f.message + &fix)
+    });
+    console::notes(&layout.collect::<Vec<_>>());
     let has_skin = head.mesh.parts.iter().any(|p| p.material == Material::Skin);
     if !has_skin && common.maps > 0 {
         let message =

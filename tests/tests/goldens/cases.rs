@@ -118,6 +118,7 @@ pub(crate) fn all() -> Vec<Case> {
 fn scatter() -> Vec<Case> {
     let methods = [
         "none",
+        "texture-space:512",
         "separable:5",
         "separable:17",
         "separable:65",
@@ -140,7 +141,14 @@ fn transmit() -> Vec<Case> {
     let picture = |transmit: &'static str| {
         case(&format!("transmit-{transmit}"), "ear", Methods { transmit, exposure: 1.4, ..USUAL })
     };
-    ["none", "shadow-depth"].into_iter().map(picture).collect()
+    let over_skin = |transmit: &'static str| {
+        let methods = Methods { scatter: "texture-space:512", transmit, exposure: 1.4, ..USUAL };
+        case(&format!("transmit-{transmit}-texture-space"), "ear", methods)
+    };
+    let maps = Case { name: "transmit-translucent-shadow-map".into(), ..over_skin("translucent-shadow-map") };
+    let mut all: Vec<Case> = ["none", "shadow-depth"].into_iter().map(picture).collect();
+    all.extend([over_skin("shadow-depth"), maps]);
+    all
 }
 
 fn appearance() -> Vec<Case> {

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! needs --------> inputs that the frame prepares: backs of the heads, a margin around the picture, transmittance
+//! take_heads ---> what it keeps of each head, or why it cannot draw it
 //! before_view --> maps of a head, light on all of its surface; only for methods that ask for it
 //! skin_light ---> the rule by which `shade` lights skin, with its tables and maps
 //! after_shading -> diffuse radiance from images of the lit surface
@@ -13,6 +14,7 @@
 pub(crate) mod preintegrated;
 pub(crate) mod screen;
 pub(crate) mod surface;
+pub(crate) mod texture;
 
 use std::sync::Arc;
 
@@ -23,7 +25,7 @@ use crate::error::RenderError;
 use crate::passes::shade::{Lit, Shade, SkinLight, Transmittance};
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
-use crate::scene::{PosedHead, Scene};
+use crate::scene::{HeadInstance, PosedHead, Scene};
 use crate::settings::{Quality, ScatterMethod};
 
 /// Requirements of a method on the frame.
@@ -64,6 +66,19 @@ pub(crate) trait Diffusion {
     /// What it asks of the frame.
     fn needs(&self) -> Needs {
         Needs::default()
+    }
+
+    /// Prepares what it keeps of the heads of the next frame, and drops what it keeps of others.
+    ///
+    /// # Errors
+    /// It cannot draw one of them.
+    fn take_heads(&mut self, _gpu: &Gpu, _heads: &[HeadInstance<'_>]) -> Result<(), RenderError> {
+        Ok(())
+    }
+
+    /// Bytes that it keeps on the device from frame to frame.
+    fn memory_bytes(&self) -> u64 {
+        0
     }
 
     /// Work before any sample of a pixel is drawn: maps of the heads, light on all of their surface. Only for methods
@@ -114,6 +129,7 @@ pub(crate) fn method(
         ScatterMethod::ScreenGauss(n) => Box::new(gauss::ScreenGauss::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenJitter => Box::new(jitter::gather(gpu, profile)),
         ScatterMethod::BurleyDisk(n) => Box::new(disk::gather(gpu, profile, n as usize)?),
+        ScatterMethod::TextureSpace(side) => Box::new(texture::TextureSpace::new(gpu, profile, side)?),
         ScatterMethod::ReferenceScreen => Box::new(exact::gather(gpu, profile)),
         ScatterMethod::ReferenceSurface(_) => return Ok(None),
     }))

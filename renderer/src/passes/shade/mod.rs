@@ -129,6 +129,12 @@ pub(crate) trait SkinLight {
     fn resources<'a>(&'a self, head: &PosedHead<'a>) -> Vec<Resource<'a>>;
 }
 
+/// A shader that imports from this pass; `flag` turns on variants of it.
+pub(crate) fn importing(root: Module, flag: Option<&'static str>) -> Program {
+    let program = Program::new(root).with(&[SHADER]);
+    with_constants(flag.into_iter().fold(program, |p, f| p.flag(f, true)))
+}
+
 fn with_constants(program: Program) -> Program {
     program
         .with(&PARTS)
@@ -412,7 +418,7 @@ impl Shade {
     }
 
     /// Bindings of the light on a head, for pixels or points.
-    fn resources<'a>(
+    pub(crate) fn resources<'a>(
         &'a self,
         lighting: &Lighting<'a>,
         posed: &PosedHead<'a>,
@@ -458,7 +464,7 @@ fn upload_directional_albedo(gpu: &Gpu, method: SpecularMethod) -> wgpu::Texture
 }
 
 /// Numbers of the pass for one head.
-fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
+pub(crate) fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
     let maps = posed.head.maps.as_ref();
     let quality = lighting.quality;
     let hemoglobin_scale = match quality.color {
