@@ -157,10 +157,18 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Clears the history, for a cut: temporal antialiasing then mixes no previous frame into the next one.
+    /// Clears the history, for a cut: temporal antialiasing and methods that refine a still scene then mix no previous frame
+    /// into the next one.
     /// `frame` is the number of the next frame: even and odd frames have different sample positions.
     pub fn cut(&mut self, frame: u64) {
         self.past = Past { frames: frame, ..Past::default() };
+        self.forget_light();
+    }
+
+    fn forget_light(&mut self) {
+        if let Some(method) = &mut self.diffusion.method {
+            method.forget();
+        }
     }
 
     /// Records a frame into the caller's encoder and its picture into the caller's texture: `Rgba8Unorm`, of the size
@@ -259,6 +267,8 @@ impl Renderer {
         let mut pending = VecDeque::new();
         let mut times = Vec::new();
         for frame in 0..warm_up + frames {
+            // The cost of a frame in which something moves.
+            self.forget_light();
             let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
             self.record_frame(&mut encoder, scene, settings, None)?;
             let of_frame = self.timer.finish(&self.gpu, &mut encoder);
@@ -403,6 +413,7 @@ impl Renderer {
         self.images.bytes()
             + self.instances.iter().map(Instance::bytes).sum::<u64>()
             + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
+            + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.past.history.as_ref().map_or(0, History::memory_bytes)
             + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()
     }

@@ -9,6 +9,8 @@
 //! The frame calls the stages and knows no method. A method is a folder here, a row in [`crate::settings::methods`] and
 //! an arm of the `match` in [`method`], which the compiler enforces.
 
+pub(crate) mod bssrdf;
+pub(crate) mod cubemap;
 pub(crate) mod screen;
 pub(crate) mod surface;
 
@@ -78,6 +80,14 @@ pub(crate) trait Diffusion {
     ) -> Image {
         lit.irradiance.clone()
     }
+
+    /// Drops what it keeps from frame to frame.
+    fn forget(&mut self) {}
+
+    /// Bytes of its buffers on the device, without images of the frame.
+    fn memory_bytes(&self) -> u64 {
+        0
+    }
 }
 
 /// No scattering: light leaves skin where it enters.
@@ -101,6 +111,7 @@ pub(crate) fn method(
         ScatterMethod::ScreenGauss(n) => Box::new(gauss::ScreenGauss::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenJitter => Box::new(jitter::gather(gpu, profile)),
         ScatterMethod::BurleyDisk(n) => Box::new(disk::gather(gpu, profile, n as usize)?),
+        ScatterMethod::DipoleCubemap(n) => Box::new(cubemap::DipoleCubemap::new(gpu, profile, n)?),
         ScatterMethod::ReferenceScreen => Box::new(exact::gather(gpu, profile)),
         ScatterMethod::ReferenceSurface(_) => return Ok(None),
     }))

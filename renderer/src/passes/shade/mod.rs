@@ -111,6 +111,11 @@ pub(crate) fn authored_program() -> Program {
     with_constants(Program::new(AUTHORED_SHADER).with(&[SHADER]))
 }
 
+/// A shader that imports from this pass.
+pub(crate) fn importing(root: Module) -> Program {
+    with_constants(Program::new(root).with(&[SHADER]))
+}
+
 fn with_constants(program: Program) -> Program {
     program
         .with(&PARTS)
@@ -384,7 +389,7 @@ impl Shade {
     }
 
     /// Bindings of the light on a head, for pixels or points.
-    fn resources<'a>(
+    pub(crate) fn resources<'a>(
         &'a self,
         lighting: &Lighting<'a>,
         posed: &PosedHead<'a>,
@@ -429,7 +434,7 @@ fn upload_directional_albedo(gpu: &Gpu, method: SpecularMethod) -> wgpu::Texture
 }
 
 /// Numbers of the pass for one head.
-fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
+pub(crate) fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
     let maps = posed.head.maps.as_ref();
     let quality = lighting.quality;
     let hemoglobin_scale = match quality.color {
