@@ -165,6 +165,12 @@ impl Renderer {
         self.forget_light();
     }
 
+    /// The method of the last frame, for tests that change it.
+    #[cfg(test)]
+    pub(crate) fn diffusion(&mut self) -> &mut Option<Box<dyn crate::passes::diffusion::Diffusion>> {
+        &mut self.diffusion.method
+    }
+
     fn forget_light(&mut self) {
         if let Some(method) = &mut self.diffusion.method {
             method.forget();
@@ -234,7 +240,8 @@ impl Renderer {
             return self.draw(scene, settings);
         };
         self.prepare(scene, settings)?;
-        self.passes.shade.prepare_samples(&self.gpu);
+        let directional = settings.quality.profile.directional().is_some();
+        self.passes.shade.prepare_samples(&self.gpu, directional);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.images.begin_frame();
         self.timer.restart();

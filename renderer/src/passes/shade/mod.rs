@@ -102,8 +102,8 @@ pub(crate) fn program() -> Program {
 }
 
 /// The shader of the pass that lights points of the surface.
-pub(crate) fn samples_program() -> Program {
-    with_constants(Program::new(SAMPLES_SHADER).with(&[SHADER]))
+pub(crate) fn samples_program(with_normals: bool) -> Program {
+    with_constants(Program::new(SAMPLES_SHADER).with(&[SHADER]).flag("normals", with_normals))
 }
 
 /// The shader of the pass that lights what keeps the material of its author.
@@ -269,7 +269,7 @@ pub(crate) struct Lit {
 pub(crate) struct Shade {
     kernel: Kernel,
     /// Made by the first frame that lights points of the surface.
-    samples_kernel: Option<Kernel>,
+    samples_kernel: Option<(bool, Kernel)>,
     /// Made by the first frame that shows a material of an author.
     authored_kernel: OnceLock<(Kernel, wgpu::TextureView)>,
     trilinear_repeat: wgpu::Sampler,
@@ -366,10 +366,13 @@ impl Shade {
         lit
     }
 
-    /// Makes the resources of [`Shade::record_samples`].
-    pub(crate) fn prepare_samples(&mut self, gpu: &Gpu) {
-        self.samples_kernel
-            .get_or_insert_with(|| Kernel::new(gpu, "light samples", &samples_program(), "light_samples"));
+    /// Makes the resources of [`Shade::record_samples`]; `with_normals` if each light is followed by the smooth normal.
+    pub(crate) fn prepare_samples(&mut self, gpu: &Gpu, with_normals: bool) {
+        if self.samples_kernel.as_ref().is_none_or(|(normals, _)| *normals != with_normals) {
+            let kernel =
+                Kernel::new(gpu, "light samples", &samples_program(with_normals), "light_samples");
+            self.samples_kernel = Some((with_normals, kernel));
+        }
     }
 
     /// Diffuse light at `count` points of a head's surface.
@@ -381,7 +384,7 @@ impl Shade {
         [samples, light]: [&wgpu::Buffer; 2],
         count: u32,
     ) {
-        let Some(kernel) = &self.samples_kernel else { return };
+        let Some((_, kernel)) = &self.samples_kernel else { return };
         let params = r.uniform("light samples", &params(lighting, head));
         let mut resources = self.resources(lighting, head, &params);
         resources.extend([("surface_samples", samples.bound()), ("sample_light", light.bound())]);
