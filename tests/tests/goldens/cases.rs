@@ -126,6 +126,7 @@ fn scatter() -> Vec<Case> {
         "screen-jitter",
         "burley-disk:16",
         "burley-disk:64",
+        "dipole-cubemap:16",
         "reference-screen",
         "reference-surface:2",
     ];
@@ -140,7 +141,11 @@ fn transmit() -> Vec<Case> {
     let picture = |transmit: &'static str| {
         case(&format!("transmit-{transmit}"), "ear", Methods { transmit, exposure: 1.4, ..USUAL })
     };
-    ["none", "shadow-depth"].into_iter().map(picture).collect()
+    let mut all: Vec<Case> = ["none", "shadow-depth"].into_iter().map(picture).collect();
+    // Its disks carry the light that comes through.
+    let through = Methods { scatter: "dipole-cubemap:16", exposure: 1.4, ..USUAL };
+    all.push(case("transmit-dipole-cubemap", "ear", through));
+    all
 }
 
 fn appearance() -> Vec<Case> {

@@ -113,7 +113,12 @@ impl Layer {
     }
 }
 
-/// The layers of a head: lamps that shine, then the axes. Returns how many are lamps.
+/// Whether a lamp gives light.
+pub(crate) fn shines(light: &Light) -> bool {
+    light.color_linear.max_element() > 0.0
+}
+
+/// The layers of a head: lamps that shine and cast shadows, then the axes. Returns how many are lamps.
 pub(crate) fn layers(
     bounds: (Vec3, Vec3),
     world_from_head: &Mat4,
@@ -121,10 +126,10 @@ pub(crate) fn layers(
 ) -> ([Layer; MOST_LAYERS], usize) {
     let corners = corners(bounds, world_from_head);
     let mut all: [Layer; MOST_LAYERS] = bytemuck::Zeroable::zeroed();
-    let shining =
-        lights.iter().take(MAX_LIGHTS).enumerate().filter(|(_, l)| l.color_linear.max_element() > 0.0);
     let mut lamps = 0;
-    for (number, light) in shining {
+    for (number, light) in
+        lights.iter().take(MAX_LIGHTS).enumerate().filter(|(_, l)| l.casts_shadow && shines(l))
+    {
         all[lamps] = Layer::of_lamp(&light.kind, number, &corners);
         lamps += 1;
     }

@@ -4,6 +4,7 @@
 //! positions, lamps --draw: triangles into all layers at once--> depth, id of each layer   (lamps, six axes)
 //!     --light--> texels: depth, normal, light per area of the layer, strength
 //!     --gather: N samples per texel of an axis and layer--> far light of the six axes  (mean over frames while nothing moves)
+//!     --smooth: means over 3 x 3 texels of one surface, less with every frame-->
 //! irradiance --near: a disk on the picture--> near light --combine: axes that show the pixel--> scattered
 //! ```
 //!
@@ -28,7 +29,8 @@
 //!   costs nine times its vertices.
 //!
 //! The sky is light of the axes' own texels: each is a lamp that sees what it sees, and they share a place by the
-//! squares of their cosines. Its light has no direction, so a directional dipole scatters it by its mean.
+//! squares of their cosines. So are lamps without shadows, which light what they do not see. This light has no direction
+//! here, so a directional dipole scatters it by its mean.
 //!
 //! State: the far light of the axes of the last frame and the number of frames in it, while heads, lamps, sky, profile and quality
 //! stay the same; the camera may move. [`Diffusion::forget`] drops it, which [`crate::Renderer::cut`] calls. After
@@ -52,7 +54,7 @@ use rubor_rig::face_state::FaceState;
 use rubor_rig::head::Material;
 use rubor_rig::skin::profile::Profile;
 
-use self::layers::{AXES, Layer, MOST_LAYERS, layers};
+use self::layers::{AXES, Layer, MOST_LAYERS, layers, shines};
 use self::tables::Tables;
 use super::bssrdf::{BSSRDF, Dipole};
 use super::screen::gather;
@@ -63,13 +65,14 @@ use crate::error::RenderError;
 use crate::passes::pixel_groups;
 use crate::passes::shade::{self, Lighting, Lit};
 use crate::scene::view::Seen;
-use crate::scene::{Light, PosedHead};
+use crate::scene::{Light, PosedHead, Scene};
 use crate::settings::Quality;
 
 const COMMON: Module = module!("cubemap_common", "common.wesl");
 const DRAW: Module = module!("cubemap_draw", "draw.wesl");
 const LIGHT: Module = module!("cubemap_light", "light.wesl");
 const GATHER: Module = module!("cubemap_gather", "gather.wesl");
+const SMOOTH: Module = module!("cubemap_smooth", "smooth.wesl");
 const COMBINE: Module = module!("cubemap_combine", "combine.wesl");
 const NEAR: Module = module!("cubemap_near", "near.wesl");
 
@@ -161,6 +164,11 @@ pub(crate) fn gather_program(refines: bool, directional: bool) -> Program {
         .constant("LEAST_STRENGTH", LEAST_STRENGTH)
 }
 
+/// The shader of the means over neighbours.
+pub(crate) fn smooth_program() -> Program {
+    Program::new(SMOOTH).with(&[COMMON, BSSRDF]).constant("LEAST_STRENGTH", LEAST_STRENGTH)
+}
+
 /// The shader of the combination.
 pub(crate) fn combine_program() -> Program {
     Program::new(COMBINE).with(&[COMMON, BSSRDF]).constant("LEAST_STRENGTH", LEAST_STRENGTH)
@@ -186,7 +194,10 @@ struct Scenery {
 struct OfHead {
     cube: wgpu::Buffer,
     texels: Image,
+    /// As gathered: the mean of the frames so far.
     far: Image,
+    /// The same, smoothed.
+    smoothed: Image,
 }
 
 /// What is divided around one radius.
@@ -209,6 +220,7 @@ pub(crate) struct DipoleCubemap {
     gather: Kernel,
     /// Made by the first frame that is refined.
     refine: Option<Kernel>,
+    smooth: Kernel,
     combine: Kernel,
     divided: Option<Divided>,
     /// Depths and ids of the layers of one head at a time.
@@ -247,6 +259,7 @@ impl DipoleCubemap {
             light: kernel("scatter: light", &light_program(), "light_layers"),
             gather: kernel("scatter: disks", &gather_program(false, is_directional), "gather_layers"),
             refine: None,
+            smooth: kernel("scatter: smooth", &smooth_program(), "smooth_axes"),
             combine: kernel("scatter: combine", &combine_program(), "combine"),
             divided: None,
             drawn: None,
@@ -315,6 +328,12 @@ fn side_of(frame: &Before<'_>, head: &PosedHead<'_>) -> u32 {
     let pixels = extent * focal / depth.max(0.25 * extent);
     let last = SIDES[SIDES.len() - 1];
     SIDES.into_iter().find(|side| pixels <= PIXELS_PER_TEXEL * *side as f32).unwrap_or(last)
+}
+
+/// Whether there is light that the axes carry: of the sky, or of lamps without shadows.
+fn has_even_light(scene: &Scene<'_>) -> bool {
+    (scene.environment.is_some() && scene.environment_intensity > 0.0)
+        || scene.lights.iter().any(|l| !l.casts_shadow && shines(l))
 }
 
 /// Side of the largest texel of a head's axes at their largest size, mm.
@@ -400,7 +419,7 @@ impl Diffusion for DipoleCubemap {
                 ("albedo", lit.albedo.bound()),
                 ("near", near.bound()),
                 ("texels", own.texels.bound()),
-                ("far", own.far.bound()),
+                ("far", own.smoothed.bound()),
                 ("scattered", scattered.bound()),
             ];
             (resources, pixel_groups(size))
@@ -443,7 +462,7 @@ impl DipoleCubemap {
             samples: self.samples,
             refined: self.refined,
             fixes: self.fixes.bits(),
-            has_sky: u32::from(frame.scene.environment.is_some() && frame.scene.environment_intensity > 0.0),
+            has_sky: u32::from(has_even_light(frame.scene)),
             half_width_mm: divided.tables.half_width_mm as f32,
             near_start_mm: divided.tables.window_mm[0] as f32,
             near_end_mm: divided.tables.window_mm[1] as f32,
@@ -515,6 +534,14 @@ impl DipoleCubemap {
             None => &self.gather,
         };
         r.dispatch(kernel, &resources, [x, y, AXES as u32]);
-        Some(OfHead { cube, texels, far })
+        let smoothed = r.image("smooth far light", array(wgpu::TextureFormat::Rgba16Float).layers(AXES as u32));
+        let resources = [
+            ("cube", cube.bound()),
+            ("texels", texels.bound()),
+            ("far", far.bound()),
+            ("smoothed", smoothed.bound()),
+        ];
+        r.dispatch(&self.smooth, &resources, [x, y, AXES as u32]);
+        Some(OfHead { cube, texels, far, smoothed })
     }
 }

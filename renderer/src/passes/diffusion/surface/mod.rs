@@ -258,7 +258,7 @@ struct Directional {
     dipole: Dipole,
     near_by_cosine: [[f32; 4]; COSINES + 1],
     /// Sums of a batch over its lights so far.
-    partial: wgpu::Buffer,
+    batch_sums: wgpu::Buffer,
     normals: OnceLock<Image>,
 }
 
@@ -290,7 +290,7 @@ impl Surface {
                 let inside = |c: usize| (channels[c].light_inside(near_mm, cosine) / total[c]) as f32;
                 [inside(0), inside(1), inside(2), 0.0]
             }),
-            partial: gpu.storage_zeroed("partial sums", 16 * pixels),
+            batch_sums: gpu.storage_zeroed("sums of a batch", 16 * pixels),
             normals: OnceLock::new(),
         });
         let program = program(directional.is_some());
@@ -386,7 +386,7 @@ impl Surface {
             ("squares", self.squares.bound()),
         ];
         if let Some(directional) = &self.directional {
-            resources.push(("partial", directional.partial.bound()));
+            resources.push(("batch_sums", directional.batch_sums.bound()));
             resources.extend(directional.normals.get().map(|n| ("normals", n.bound())));
         }
         r.dispatch(&self.gather, &resources, pixel_groups(seen.ids.size()));
