@@ -164,10 +164,24 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Clears the history, for a cut: temporal antialiasing then mixes no previous frame into the next one.
+    /// Clears the history, for a cut: temporal antialiasing and methods that refine a still scene then mix no previous frame
+    /// into the next one.
     /// `frame` is the number of the next frame: even and odd frames have different sample positions.
     pub fn cut(&mut self, frame: u64) {
         self.past = Past { frames: frame, ..Past::default() };
+        self.forget_light();
+    }
+
+    /// The method of the last frame, for tests that change it.
+    #[cfg(test)]
+    pub(crate) fn diffusion(&mut self) -> &mut Option<Box<dyn crate::passes::diffusion::Diffusion>> {
+        &mut self.diffusion.method
+    }
+
+    fn forget_light(&mut self) {
+        if let Some(method) = &mut self.diffusion.method {
+            method.forget();
+        }
     }
 
     /// Records a frame into the caller's encoder and its picture into the caller's texture: `Rgba8Unorm`, of the size
@@ -233,7 +247,8 @@ impl Renderer {
             return self.draw(scene, settings);
         };
         self.prepare(scene, settings)?;
-        self.passes.shade.prepare_samples(&self.gpu);
+        let directional = settings.quality.profile.directional().is_some();
+        self.passes.shade.prepare_samples(&self.gpu, directional);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.images.begin_frame();
         self.timer.restart();
@@ -266,6 +281,8 @@ impl Renderer {
         let mut pending = VecDeque::new();
         let mut times = Vec::new();
         for frame in 0..warm_up + frames {
+            // The cost of a frame in which something moves.
+            self.forget_light();
             let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
             self.record_frame(&mut encoder, scene, settings, None)?;
             let of_frame = self.timer.finish(&self.gpu, &mut encoder);
@@ -380,8 +397,9 @@ impl Renderer {
                 self.past.forget();
             }
         }
-        self.diffusion.prepare(&self.gpu, settings.quality.scatter, settings.quality.profile.shared())?;
         let rasteriser = self.rasteriser(scene, settings);
+        let profile = settings.quality.profile.shared();
+        self.diffusion.prepare(&self.gpu, rasteriser, settings.quality.scatter, profile)?;
         if self.passes.rasteriser != rasteriser {
             self.passes = Passes::new(&self.gpu, rasteriser);
         }
@@ -468,6 +486,7 @@ impl Renderer {
             + self.passes.shadow.bytes()
             + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
+            + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.past.history.as_ref().map_or(0, History::memory_bytes)
             + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()
     }

@@ -34,7 +34,9 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     assert_workgroups(&tangent_frames::program(), &line("tangent_frames"));
     assert_workgroups(&appearance::program(), &square("appearance"));
     assert_workgroups(&shade::program(), &square("shade"));
-    assert_workgroups(&shade::samples_program(), &line("light_samples"));
+    for with_normals in [false, true] {
+        assert_workgroups(&shade::samples_program(with_normals), &line("light_samples"));
+    }
     assert_workgroups(&shade::authored_program(), &square("shade_authored"));
     assert_workgroups(&compose::program(), &square("compose"));
     for tone_map in ToneMap::all() {

@@ -96,7 +96,14 @@ impl Studio {
     pub fn open(adapter: Option<&str>) -> Outcome<Self> {
         let renderer = Renderer::new(open_device(adapter)?)?;
         let skin = SkinModel::new(&ChromophoreModel::default()).bake(COLOR_TABLE_SIDE, COLOR_TABLE_SIDE);
-        Ok(Self { renderer, skin, heads: Vec::new(), surroundings: None, notes: Vec::new(), raster_is_chosen: false })
+        Ok(Self {
+            renderer,
+            skin,
+            heads: Vec::new(),
+            surroundings: None,
+            notes: Vec::new(),
+            raster_is_chosen: false,
+        })
     }
 
     /// The device.

@@ -10,10 +10,11 @@ use super::stages::Samples;
 use crate::device::readback::Readback;
 use crate::device::{Image, Recorder};
 use crate::error::RenderError;
-use crate::passes::diffusion::surface::{BATCH, Skin, Surface, relative_noise};
+use crate::passes::diffusion::surface::{BATCH, Part, Skin, Surface, relative_noise};
 use crate::passes::shade::Lighting;
 use crate::scene::PosedHead;
 use crate::scene::head::GpuVertex;
+use crate::scene::lamp::{GpuLight, Illumination};
 
 /// Draws a frame with `batches` batches of samples per head. Returns the picture and the relative standard error of the
 /// diffuse light.
@@ -44,20 +45,43 @@ pub(crate) async fn draw(
     for subsample in frame.subsamples() {
         let seen = frame.see(r, subsample);
         let lit = frame.shade(r, &light, &seen, &samples, None);
-        let integral = Surface::new(r.gpu, &frame.settings.quality.profile, size);
-        let lighting = Lighting {
-            light: &light,
+        let integral = Surface::new(r.gpu, &frame.settings.quality.profile, size)?;
+        integral.record_normals(r, &seen, &frame.heads);
+        let lights = if integral.is_directional() { one_by_one(&light) } else { Vec::new() };
+        let lighting = |light| Lighting {
+            light,
             seen: &seen,
             first: None,
             transmittance: None,
             quality: &frame.settings.quality,
             skin_light: None,
         };
+        let lit_alone: Vec<_> = lights
+            .iter()
+            .map(|(l, _)| frame.passes.shade.record(r, &lighting(l), &frame.heads, None))
+            .collect();
+        let mut parts = vec![(&light, Part { lit: &lit, lamp: None, index: [0, 1] })];
+        if integral.is_directional() {
+            let count = lights.len() as u32;
+            parts = (lights.iter().zip(&lit_alone).zip(0..))
+                .map(|(((l, lamp), lit), i)| (l, Part { lit, lamp: lamp.as_ref(), index: [i, count] }))
+                .collect();
+        }
         for (head, skin) in frame.heads.iter().zip(&skins) {
             for batch in 0..batches {
-                integral.record_batch(r, (&seen, &lit), (head.index, skin), batch, &|r, samples, light| {
-                    frame.passes.shade.record_samples(r, &lighting, head, [samples, light], BATCH as u32);
-                });
+                for (light, part) in &parts {
+                    integral.record_batch(
+                        r,
+                        (&seen, *part),
+                        (head.index, skin),
+                        batch,
+                        &|r, samples, sample_light| {
+                            let buffers = [samples, sample_light];
+                            let shade = &frame.passes.shade;
+                            shade.record_samples(r, &lighting(light), head, buffers, BATCH as u32);
+                        },
+                    );
+                }
                 // One batch at a time in memory.
                 r.submit();
                 r.gpu.idle().await?;
@@ -70,6 +94,30 @@ pub(crate) async fn draw(
         frame.show(r, &light, seen, lit, &diffuse, &mut samples);
     }
     Ok((frame.antialias(r, samples)?, noise))
+}
+
+/// Each lamp by itself, and the sky by itself.
+fn one_by_one<'a>(all: &Illumination<'a>) -> Vec<(Illumination<'a>, Option<GpuLight>)> {
+    let dark = |intensity| Illumination {
+        lights: all.lights.map(|l| GpuLight { color: [0.0, 0.0, 0.0, l.color[3]], ..l }),
+        shadows: all.shadows.clone(),
+        environment: all.environment,
+        environment_intensity: intensity,
+        environment_rotation: all.environment_rotation,
+    };
+    let shining = all.lights.iter().enumerate().filter(|(_, l)| l.color[..3].iter().any(|c| *c > 0.0));
+    let mut parts: Vec<_> = shining
+        .map(|(i, lamp)| {
+            let mut alone = dark(0.0);
+            alone.lights[i] = *lamp;
+            (alone, Some(*lamp))
+        })
+        .collect();
+    // At least one, as the last light of a batch ends it.
+    if parts.is_empty() || (all.environment.is_some() && all.environment_intensity > 0.0) {
+        parts.push((dark(all.environment_intensity), None));
+    }
+    parts
 }
 
 /// The surface of a head, being read back.

@@ -195,6 +195,11 @@ impl HeadOnGpu {
         (self.opaque_triangles, self.overlay_triangles)
     }
 
+    /// The undeformed points: a buffer of this head alone.
+    pub(crate) fn rest_points(&self) -> &wgpu::Buffer {
+        &self.rest
+    }
+
     /// What tells where triangles have holes; `None` where none has.
     pub(crate) fn cut_resources(&self) -> Option<Vec<Resource<'_>>> {
         let authored = self.authored.as_ref().filter(|_| self.cut_triangles > 0)?;

@@ -338,6 +338,9 @@ groups! {
         ScreenJitter, "screen-jitter", AfterShading, "Hable, Borshukov and Hejl 2009; Jimenez 2012 ch. 4";
         /// N importance-sampled taps of normalized diffusion in one pass.
         BurleyDisk(n: Number::any(4, 256, None, "taps")), "burley-disk", AfterShading, "Golubev 2018";
+        /// Disks of N samples of the BSSRDF in what each lamp sees, kept on six views of the head; knows the light's direction.
+        DipoleCubemap(n: Number::any(2, 1024, Some(16), "samples per texel")), "dipole-cubemap", BeforeView,
+            "DTU thesis draft, real-time directional subsurface scattering; Frisvad et al. 2014";
         /// The profile itself as a kernel in two dimensions, over all pixels that it reaches.
         ReferenceScreen, "reference-screen", AfterShading, "Jimenez 2012 eq. 3.2";
         /// The integral of the profile over the deformed surface, with N times 65 536 samples.

@@ -25,6 +25,7 @@
 pub mod accuracy;
 pub mod chromophores;
 pub mod diffusion;
+pub mod directional;
 pub mod fit;
 pub mod gaussians;
 pub mod kernel;

@@ -9,6 +9,7 @@ use super::diffusion::{
     BetterDipole, MultipoleSlab, NormalizedDiffusion, PhotonBeamDiffusion, SlabShape, SlabSide,
     StandardDipole,
 };
+use super::directional::{DirectionalDipole, DirectionalMedium};
 use super::fit::{Emphasis, fit_channel_exponentials, fit_channel_gaussians, refit_normalized_diffusion};
 use super::medium::Medium;
 use super::monte_carlo::AlbedoTable;
@@ -31,6 +32,8 @@ pub enum ProfileModel {
     NormalizedDiffusionRefitted,
     /// Habel et al. 2013.
     PhotonBeamDiffusion,
+    /// Frisvad et al. 2014: knows the direction of the light, where the method does.
+    DirectionalDipole,
     /// Four Gaussians fitted to a photon walk.
     #[serde(rename = "gaussians-4")]
     Gaussians4,
@@ -47,15 +50,20 @@ pub enum ProfileModel {
     MonteCarlo,
 }
 
+/// Mean cosine of a directional dipole made from a reduced medium: that of skin in the visible, 0.7 to 0.9 (van Gemert
+/// et al. 1989).
+pub const FORWARD: f64 = 0.8;
+
 impl ProfileModel {
     /// All models, in the order of reports.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::StandardDipole,
         Self::BetterDipole,
         Self::MultipoleSlab,
         Self::NormalizedDiffusion,
         Self::NormalizedDiffusionRefitted,
         Self::PhotonBeamDiffusion,
+        Self::DirectionalDipole,
         Self::Gaussians4,
         Self::Gaussians6,
         Self::Exponentials2,
@@ -74,6 +82,7 @@ impl ProfileModel {
             Self::NormalizedDiffusion => "normalized-diffusion",
             Self::NormalizedDiffusionRefitted => "normalized-diffusion-refitted",
             Self::PhotonBeamDiffusion => "photon-beam-diffusion",
+            Self::DirectionalDipole => "directional-dipole",
             Self::Gaussians4 => "gaussians-4",
             Self::Gaussians6 => "gaussians-6",
             Self::Exponentials2 => "exponentials-2",
@@ -86,7 +95,11 @@ impl ProfileModel {
     pub fn needs_walk(self) -> bool {
         !matches!(
             self,
-            Self::StandardDipole | Self::BetterDipole | Self::MultipoleSlab | Self::PhotonBeamDiffusion
+            Self::StandardDipole
+                | Self::BetterDipole
+                | Self::MultipoleSlab
+                | Self::PhotonBeamDiffusion
+                | Self::DirectionalDipole
         )
     }
 
@@ -114,6 +127,12 @@ impl ProfileModel {
             }
             Self::PhotonBeamDiffusion => {
                 RadialProfile::PhotonBeamDiffusion(PhotonBeamDiffusion::new(medium)?)
+            }
+            Self::DirectionalDipole => {
+                RadialProfile::DirectionalDipole(DirectionalDipole::new(DirectionalMedium {
+                    medium,
+                    anisotropy: FORWARD,
+                })?)
             }
             Self::NormalizedDiffusion => {
                 let total = walked()?.total();

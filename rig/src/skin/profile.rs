@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::diffusion::{
     BetterDipole, ExponentialSum, MultipoleSlab, NormalizedDiffusion, PhotonBeamDiffusion, StandardDipole,
 };
+use super::directional::DirectionalDipole;
 use super::gaussians::{DEON_SIX, GaussianSum, GaussianTerm, JIMENEZ_FOUR};
 use super::numerics::{gauss_legendre, integrate, invert_cdf};
 use super::table::RadialTable;
@@ -35,6 +36,8 @@ pub enum RadialProfile {
     NormalizedDiffusion(NormalizedDiffusion),
     /// Photon beam diffusion.
     PhotonBeamDiffusion(PhotonBeamDiffusion),
+    /// Directional dipole; as a radial profile its mean over all directions of light.
+    DirectionalDipole(DirectionalDipole),
     /// A sum of exponentials over r.
     Exponentials(ExponentialSum),
     /// A table, such as a photon walk's.
@@ -53,6 +56,10 @@ macro_rules! each {
             RadialProfile::Exponentials($p) => $body,
             RadialProfile::PhotonBeamDiffusion(beam) => {
                 let $p = beam.table();
+                $body
+            }
+            RadialProfile::DirectionalDipole(dipole) => {
+                let $p = dipole.table();
                 $body
             }
             RadialProfile::Tabulated($p) => $body,
@@ -178,6 +185,15 @@ impl Profile {
             RadialProfile::Gaussians(sum)
         };
         Self { name: name.into(), channels: std::array::from_fn(channel) }
+    }
+
+    /// The channels as BSSRDFs that know the direction of the light, if they are.
+    pub fn directional(&self) -> Option<[&DirectionalDipole; 3]> {
+        let [r, g, b] = self.channels.each_ref().map(|c| match c {
+            RadialProfile::DirectionalDipole(dipole) => Some(dipole),
+            _ => None,
+        });
+        Some([r?, g?, b?])
     }
 
     /// R(r) of each channel, mm^-2.

@@ -4,8 +4,9 @@ use rubor_rig::skin::accuracy::{AccuracyOptions, accuracy_table};
 use std::str::FromStr;
 
 use rubor_rig::names::nearest;
+use rubor_rig::skin::directional::{DirectionalDipole, DirectionalMedium};
 use rubor_rig::skin::medium::{Medium, SKIN1, SKIN2, rgb_media};
-use rubor_rig::skin::model::ProfileModel;
+use rubor_rig::skin::model::{FORWARD, ProfileModel};
 use rubor_rig::skin::profile::{Profile, RadialProfile};
 use rubor_rig::skin::report::profile_report;
 
@@ -50,7 +51,8 @@ pub(crate) struct Choice {
     /// Absorption coefficient of that medium, 1/mm: one number or R,G,B
     #[arg(long, value_name = "RGB", allow_hyphen_values = true, requires = "sigma_s")]
     sigma_a: Option<Rgb>,
-    /// Mean cosine g of its scattering; monte-carlo walks with it, other models reduce --sigma-s by 1 - g
+    /// Mean cosine g of its scattering; monte-carlo walks with it, directional-dipole takes it (else 0.8), other models
+    /// reduce --sigma-s by 1 - g
     #[arg(long, value_name = "G", allow_negative_numbers = true, requires = "sigma_s")]
     anisotropy: Option<f64>,
     /// How the profile follows from the medium, such as monte-carlo, better-dipole, normalized-diffusion
@@ -105,6 +107,13 @@ impl Choice {
         let [s, a] = coefficients;
         let reduced = |c: usize| Medium::reduced(s[c], anisotropy, a[c], self.eta).map_err(Failure::input);
         let media = [reduced(0)?, reduced(1)?, reduced(2)?];
+        if self.model == ProfileModel::DirectionalDipole {
+            let anisotropy = self.anisotropy.unwrap_or(FORWARD);
+            let dipole = |medium| DirectionalDipole::new(DirectionalMedium { medium, anisotropy });
+            let [r, g, b] =
+                media.map(|m| dipole(m).map(RadialProfile::DirectionalDipole).map_err(Failure::input));
+            return Ok(Profile { name, channels: [r?, g?, b?] });
+        }
         if !self.model.needs_walk() {
             return self.model.profile(&name, &media, None, 0).map_err(Failure::input);
         }

@@ -127,6 +127,7 @@ fn scatter() -> Vec<Case> {
         "screen-jitter",
         "burley-disk:16",
         "burley-disk:64",
+        "dipole-cubemap:16",
         "reference-screen",
         "reference-surface:2",
     ];
@@ -148,6 +149,9 @@ fn transmit() -> Vec<Case> {
     let maps = Case { name: "transmit-translucent-shadow-map".into(), ..over_skin("translucent-shadow-map") };
     let mut all: Vec<Case> = ["none", "shadow-depth"].into_iter().map(picture).collect();
     all.extend([over_skin("shadow-depth"), maps]);
+    // Its disks carry the light that comes through.
+    let through = Methods { scatter: "dipole-cubemap:16", exposure: 1.4, ..USUAL };
+    all.push(case("transmit-dipole-cubemap", "ear", through));
     all
 }
 

@@ -11,6 +11,8 @@
 //! The frame calls the stages and knows no method. A method is a folder here, a row in [`crate::settings::methods`] and
 //! an arm of the `match` in [`method`], which the compiler enforces.
 
+pub(crate) mod bssrdf;
+pub(crate) mod cubemap;
 pub(crate) mod preintegrated;
 pub(crate) mod screen;
 pub(crate) mod surface;
@@ -22,6 +24,7 @@ use rubor_rig::skin::profile::Profile;
 
 use crate::device::{Gpu, Image, Recorder};
 use crate::error::RenderError;
+use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::shade::{Lit, Shade, SkinLight, Transmittance};
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
@@ -90,11 +93,6 @@ pub(crate) trait Diffusion {
         None
     }
 
-    /// Bytes that it keeps on the device from frame to frame.
-    fn memory_bytes(&self) -> u64 {
-        0
-    }
-
     /// Diffuse radiance of a white surface from images of its light.
     fn after_shading(
         &mut self,
@@ -105,6 +103,9 @@ pub(crate) trait Diffusion {
     ) -> Image {
         lit.irradiance.clone()
     }
+
+    /// Drops what it keeps from frame to frame.
+    fn forget(&mut self) {}
 }
 
 /// No scattering: light leaves skin where it enters.
@@ -118,18 +119,26 @@ impl Diffusion for Unscattered {}
 /// Its number is out of range, or the profile cannot be fitted.
 pub(crate) fn method(
     gpu: &Gpu,
+    rasteriser: Rasteriser,
     method: ScatterMethod,
     profile: &Profile,
 ) -> Result<Option<Box<dyn Diffusion>>, RenderError> {
     use screen::{disk, exact, gauss, jitter, separable};
     Ok(Some(match method.validate()? {
         ScatterMethod::None => Box::new(Unscattered),
-        ScatterMethod::PreIntegrated(n) => Box::new(preintegrated::PreIntegrated::new(gpu, profile, n)?),
+        ScatterMethod::PreIntegrated(n) => {
+            Box::new(preintegrated::PreIntegrated::new(gpu, rasteriser, profile, n)?)
+        }
         ScatterMethod::Separable(n) => Box::new(separable::Separable::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenGauss(n) => Box::new(gauss::ScreenGauss::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenJitter => Box::new(jitter::gather(gpu, profile)),
         ScatterMethod::BurleyDisk(n) => Box::new(disk::gather(gpu, profile, n as usize)?),
-        ScatterMethod::TextureSpace(side) => Box::new(texture::TextureSpace::new(gpu, profile, side)?),
+        ScatterMethod::TextureSpace(side) => {
+            Box::new(texture::TextureSpace::new(gpu, rasteriser, profile, side)?)
+        }
+        ScatterMethod::DipoleCubemap(n) => {
+            Box::new(cubemap::DipoleCubemap::new(gpu, rasteriser, profile, n)?)
+        }
         ScatterMethod::ReferenceScreen => Box::new(exact::gather(gpu, profile)),
         ScatterMethod::ReferenceSurface(_) => return Ok(None),
     }))
@@ -138,7 +147,7 @@ pub(crate) fn method(
 /// The method of the last frame.
 #[derive(Default)]
 pub(crate) struct Prepared {
-    key: Option<(ScatterMethod, Arc<Profile>)>,
+    key: Option<(Rasteriser, ScatterMethod, Arc<Profile>)>,
     pub(crate) method: Option<Box<dyn Diffusion>>,
 }
 
@@ -150,15 +159,16 @@ impl Prepared {
     pub(crate) fn prepare(
         &mut self,
         gpu: &Gpu,
+        rasteriser: Rasteriser,
         wanted: ScatterMethod,
         profile: &Arc<Profile>,
     ) -> Result<(), RenderError> {
-        if self.key.as_ref().is_some_and(|(m, p)| *m == wanted && p == profile) {
+        if self.key.as_ref().is_some_and(|(r, m, p)| (*r, *m) == (rasteriser, wanted) && p == profile) {
             return Ok(());
         }
         self.key = None;
-        self.method = method(gpu, wanted, profile)?;
-        self.key = Some((wanted, profile.clone()));
+        self.method = method(gpu, rasteriser, wanted, profile)?;
+        self.key = Some((rasteriser, wanted, profile.clone()));
         Ok(())
     }
 }

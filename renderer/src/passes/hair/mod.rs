@@ -26,7 +26,7 @@ impl Blended {
         program: Program,
         [vertex, fragment]: [&str; 2],
     ) -> Self {
-        let tests_depth = rasteriser != Rasteriser::Hardware;
+        let tests_depth = rasteriser.stores_depth();
         let program = program.flag("tests_depth", tests_depth).flag("stored_shadows", tests_depth);
         let target = Some(wgpu::ColorTargetState {
             format: wgpu::TextureFormat::Rgba16Float,

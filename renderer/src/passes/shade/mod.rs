@@ -106,8 +106,8 @@ pub(crate) fn program() -> Program {
 }
 
 /// The shader of the pass that lights points of the surface.
-pub(crate) fn samples_program() -> Program {
-    with_constants(Program::new(SAMPLES_SHADER).with(&[SHADER]))
+pub(crate) fn samples_program(with_normals: bool) -> Program {
+    with_constants(Program::new(SAMPLES_SHADER).with(&[SHADER]).flag("normals", with_normals))
 }
 
 /// The shader of the pass that lights what keeps the material of its author.
@@ -290,7 +290,7 @@ pub(crate) struct Lit {
 pub(crate) struct Shade {
     kernel: Kernel,
     /// Made by the first frame that lights points of the surface.
-    samples_kernel: Option<Kernel>,
+    samples_kernel: Option<(bool, Kernel)>,
     /// Made by the first frame that shows a material of an author.
     authored_kernel: OnceLock<(Kernel, wgpu::TextureView)>,
     /// Whether shadow maps are floats and no depth textures.
@@ -306,7 +306,7 @@ pub(crate) struct Shade {
 
 impl Shade {
     pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
-        let stored_shadows = rasteriser != Rasteriser::Hardware;
+        let stored_shadows = rasteriser.stores_depth();
         let program = program().flag("stored_shadows", stored_shadows);
         let linear = wgpu::SamplerDescriptor {
             mag_filter: wgpu::FilterMode::Linear,
@@ -410,7 +410,7 @@ impl Shade {
         [samples, light]: [&wgpu::Buffer; 2],
         count: u32,
     ) {
-        let Some(kernel) = &self.samples_kernel else { return };
+        let Some((_, kernel)) = &self.samples_kernel else { return };
         let params = r.uniform("light samples", &params(lighting, head));
         let mut resources = self.resources(lighting, head, &params);
         resources.extend([("surface_samples", samples.bound()), ("sample_light", light.bound())]);

@@ -55,6 +55,7 @@ use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Kernel, Recorder};
 use crate::error::RenderError;
+use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::shade::{SkinLight, skin_light_program};
 use crate::scene::PosedHead;
 use crate::settings::CurvatureMethod;
@@ -94,6 +95,7 @@ pub(crate) fn program(by_channel: bool, on_screen: bool) -> Program {
 
 /// The method, ready for one profile.
 pub(crate) struct PreIntegrated {
+    rasteriser: Rasteriser,
     by_channel: bool,
     profile_kernel: SeparableKernel,
     tables: Tables,
@@ -117,7 +119,12 @@ impl PreIntegrated {
     ///
     /// # Errors
     /// The profile has no finite width.
-    pub(crate) fn new(gpu: &Gpu, profile: &Profile, maps: u32) -> Result<Self, RenderError> {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        rasteriser: Rasteriser,
+        profile: &Profile,
+        maps: u32,
+    ) -> Result<Self, RenderError> {
         let by_channel = maps == 3;
         let tables = Tables::new(gpu, profile)?;
         let rgb = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32, 0.0];
@@ -137,6 +144,7 @@ impl PreIntegrated {
             blurred: rgb(blurred),
         };
         Ok(Self {
+            rasteriser,
             by_channel,
             profile_kernel: SeparableKernel::of(profile, TAPS)?,
             tables,
@@ -157,7 +165,8 @@ impl Diffusion for PreIntegrated {
     fn before_view(&mut self, r: &mut Recorder<'_>, frame: &Before<'_>) {
         let method = frame.quality.curvature;
         if self.kernel.as_ref().is_none_or(|(of, _)| *of != method) {
-            let program = program(self.by_channel, method == CurvatureMethod::Screen);
+            let program = program(self.by_channel, method == CurvatureMethod::Screen)
+                .flag("stored_shadows", self.rasteriser.stores_depth());
             self.kernel = Some((method, Kernel::new(r.gpu, "shade", &program, "shade")));
         }
         self.heads.truncate(frame.heads.len());

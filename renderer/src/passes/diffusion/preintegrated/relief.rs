@@ -185,7 +185,8 @@ impl Relief {
             *to = [from[0] as f32, from[1] as f32, from[2] as f32, 0.0];
         }
         let level = |source: usize| (sizes[source][0] as f32 / size[0] as f32).max(1.0).log2();
-        let [first, second] = ["blurred across", "blurred across, blue"].map(|l| r.image(l, ImageSpec::light(size)));
+        let [first, second] =
+            ["blurred across", "blurred across, blue"].map(|l| r.image(l, ImageSpec::light(size)));
         let groups = pixel_groups(size);
         // Layer of a source, and where its result goes.
         let wrinkles = (0..maps.wrinkle_maps).map(|i| (1, i, first_blurred + per_map * i));
@@ -279,8 +280,10 @@ mod tests {
             for c in 0..3 {
                 let sum = taps[0][c] + 2.0 * taps[1..].iter().map(|t| t[c]).sum::<f64>();
                 assert!((sum - 1.0).abs() < 1e-9, "{texel_mm} mm, channel {c}: {sum}");
-                let width = |places: &mut dyn Iterator<Item = (f64, f64)>| places.map(|(x, w)| x * w).sum::<f64>();
-                let found = width(&mut taps.iter().enumerate().map(|(i, t)| (2.0 * i as f64 * texel_mm, t[c])));
+                let width =
+                    |places: &mut dyn Iterator<Item = (f64, f64)>| places.map(|(x, w)| x * w).sum::<f64>();
+                let found =
+                    width(&mut taps.iter().enumerate().map(|(i, t)| (2.0 * i as f64 * texel_mm, t[c])));
                 let offsets = kernel.offsets_mm.iter().map(|x| x.abs().min(radius as f64 * texel_mm));
                 let exact = width(&mut offsets.zip(kernel.weights.iter().map(|w| w[c])));
                 assert!((found - exact).abs() < 1e-9, "{texel_mm} mm, channel {c}: {found} {exact}");

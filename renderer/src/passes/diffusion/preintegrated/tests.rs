@@ -306,7 +306,8 @@ fn a_sphere_is_lit_as_the_integral_says() {
         let cosine = f64::from(normal.dot(-direction.normalize()));
         for (c, channel) in profile.channels.iter().enumerate() {
             let light = scattered_cosine(channel, Shape::Sphere, cosine, f64::from(radius)).unwrap();
-            let green = scattered_cosine(&profile.channels[1], Shape::Sphere, cosine, f64::from(radius)).unwrap();
+            let green =
+                scattered_cosine(&profile.channels[1], Shape::Sphere, cosine, f64::from(radius)).unwrap();
             // Skin without maps has a gloss of 0.6 and a roughness of 0.32.
             let expected = 3.0 / std::f64::consts::PI * light * entering(0.6, 0.32, green as f32);
             // A fiftieth of the light, and of full light where there is little: facets, and steps of the tables.
@@ -327,7 +328,8 @@ fn error_to_the_reference_on_spheres_has_a_bound() {
         let lights = [lamp(Vec3::new(-1.0, -0.1, -0.4), true)];
         let draw = |scatter| draw(&head, &state, &lights, &Wanted::of(scatter, 24, 1.7 * radius));
         let Some(reference) = draw(ScatterMethod::ReferenceSurface(8)) else { return };
-        let [found, none] = [THREE, ScatterMethod::None].map(|m| relative_error(&draw(m).unwrap(), &reference));
+        let [found, none] =
+            [THREE, ScatterMethod::None].map(|m| relative_error(&draw(m).unwrap(), &reference));
         assert!(found < bound && found < none, "{radius} mm: {found}, without scattering {none}");
     }
 }
@@ -414,7 +416,11 @@ fn relief_and_wrinkles_are_blurred_by_the_profile() {
         let one = amplitude(ScatterMethod::PreIntegrated(1)).unwrap();
         for c in 0..3 {
             let share = three[c] / none[c];
-            assert!((share - expected[c]).abs() < 0.04, "{wavelength} mm, channel {c}: {share} {}", expected[c]);
+            assert!(
+                (share - expected[c]).abs() < 0.04,
+                "{wavelength} mm, channel {c}: {share} {}",
+                expected[c]
+            );
         }
         // One map is right in red and orders the channels.
         assert!((one[0] / none[0] - expected[0]).abs() < 0.04, "{one:?} {none:?}");
@@ -522,8 +528,7 @@ fn hostile_input_gives_finite_light() {
     for profile in [Profile::deon_six(), wide] {
         for scatter in [ScatterMethod::PreIntegrated(1), THREE] {
             for wrinkles in [WrinkleMethod::PartialDerivative, WrinkleMethod::Difference] {
-                let wanted =
-                    Wanted { profile: profile.clone(), wrinkles, ..Wanted::of(scatter, 27, 180.0) };
+                let wanted = Wanted { profile: profile.clone(), wrinkles, ..Wanted::of(scatter, 27, 180.0) };
                 let Some(found) = draw(&head, &state, &lights, &wanted) else { return };
                 assert!(found.diffuse.iter().flatten().all(|v| v.is_finite() && *v >= -8192.0));
                 assert!(found.radiance.iter().all(|v| v.is_finite() && v.min_element() >= 0.0));
@@ -541,8 +546,7 @@ fn memory_of_the_method_is_counted() {
         Some(drawn.stats.memory_bytes)
     };
     let Some(none) = bytes(ScatterMethod::None) else { return };
-    let (one, three) =
-        (bytes(ScatterMethod::PreIntegrated(1)).unwrap(), bytes(THREE).unwrap());
+    let (one, three) = (bytes(ScatterMethod::PreIntegrated(1)).unwrap(), bytes(THREE).unwrap());
     // 256 x 256 texels of 8 bytes with all levels, two layers more for each of two maps.
     assert!(three - one > 2 * 256 * 256 * 8 && one > none, "{none} {one} {three}");
 }

@@ -13,6 +13,7 @@ use super::*;
 use crate::device::{Gpu, Image, ImageSpec, Recorder, depth_attachment};
 use crate::error::RenderError;
 use crate::passes::diffusion::{self, surface};
+use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::shade::{Lit, samples_program};
 use crate::scene::view::{Seen, View};
 use crate::settings::ScatterMethod;
@@ -164,7 +165,8 @@ fn run_with(
 }
 
 fn run(gpu: &Gpu, wanted: ScatterMethod, profile: &Profile, frame: &Frame) -> Vec<[f64; 4]> {
-    let mut diffusion = diffusion::method(gpu, wanted, profile).unwrap().expect("it draws in one go");
+    let mut diffusion =
+        diffusion::method(gpu, Rasteriser::Hardware, wanted, profile).unwrap().expect("it draws in one go");
     run_with(gpu, frame, |r, seen, lit| diffusion.after_shading(r, &[], seen, lit))
 }
 
@@ -271,17 +273,21 @@ fn shaders_and_structs_are_what_both_sides_count_on() {
             &offsets!(gather::Tap; place as "place", weight as "weight"),
         );
     }
-    assert_workgroups(&surface::program(), &[("gather", [8, 8, 1]), ("finish", [8, 8, 1])]);
+    for directional in [false, true] {
+        assert_workgroups(&surface::program(directional), &[("gather", [8, 8, 1]), ("finish", [8, 8, 1])]);
+    }
+    assert_workgroups(&surface::normals_program(), &[("pixel_normals", [8, 8, 1])]);
     assert_layout(
-        &surface::program(),
+        &surface::program(true),
         "gather",
         "Params",
         size_of::<surface::Params>(),
         &offsets!(surface::Params; origin as "origin", head as "head", cells as "cells", cell_mm as "cell_mm",
             half_width_mm as "half_width_mm", near_mm as "near_mm", sample_mm2 as "sample_mm2",
-            batches as "batches", near_light as "near_light"),
+            batches as "batches", near_light as "near_light", lamp as "lamp", light_index as "light_index",
+            light_count as "light_count", dipole as "dipole", near_by_cosine as "near_by_cosine"),
     );
-    for (program, entry) in [(surface::program(), "gather"), (samples_program(), "light_samples")] {
+    for (program, entry) in [(surface::program(false), "gather"), (samples_program(false), "light_samples")] {
         assert_layout(
             &program,
             entry,
@@ -558,8 +564,9 @@ fn any_zoom_gives_numbers() {
             .map(|m| RadialProfile::BetterDipole(BetterDipole::new(m).unwrap()));
         let dipole = Arc::new(Profile { name: "dipole".into(), channels: dipoles });
         for profile in [skin(), exponentials(1e-3), exponentials(100.0), dipole] {
-            let mut diffusion =
-                diffusion::method(gpu, method, &profile).unwrap().expect("it draws in one go");
+            let mut diffusion = diffusion::method(gpu, Rasteriser::Hardware, method, &profile)
+                .unwrap()
+                .expect("it draws in one go");
             for (focal, depth) in [(1e-3, 1e6), (30.0, 2e4), (5e5, 11.0), (1e9, 10.5)] {
                 let mut frame = hostile(10);
                 // The exact kernel takes 512 x 512 taps where it fills the picture.
@@ -581,6 +588,12 @@ fn any_zoom_gives_numbers() {
 fn wrong_numbers_and_profiles_are_errors() {
     let Some(gpu) = gpu() else { return };
     for wrong in [ScatterMethod::Separable(16), ScatterMethod::ScreenGauss(5), ScatterMethod::BurleyDisk(1)] {
-        assert!(matches!(diffusion::method(gpu, wrong, &skin()), Err(RenderError::Method(_))), "{wrong}");
+        assert!(
+            matches!(
+                diffusion::method(gpu, Rasteriser::Hardware, wrong, &skin()),
+                Err(RenderError::Method(_))
+            ),
+            "{wrong}"
+        );
     }
 }

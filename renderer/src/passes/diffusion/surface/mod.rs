@@ -12,9 +12,15 @@
 //! Within a radius of a millimetre the surface counts as flat: there the integral is the light of a disk times E(x),
 //! plus the sampled difference of E (a control variate; without it the steep centre of R would be nearly all noise).
 //!
+//! A directional dipole depends on the direction of each lamp and on the normals of both places, so each lamp is lit and
+//! gathered by itself; the sky's light has no direction and takes the mean. Within the radius where the surface counts as flat
+//! the light is that of a disk at the lamp's incidence.
+//!
 //! The error falls at least as 1 / sqrt(N); it is estimated from the spread of the batches.
 //!
 //! Does not: see skin outside of the picture's frame by more than the kernel, average light over a pixel.
+
+use std::sync::OnceLock;
 
 use glam::{Mat4, Vec3};
 use rubor_rig::head::Material;
@@ -26,8 +32,11 @@ use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
 use crate::error::RenderError;
 use crate::passes::diffusion::Needs;
+use crate::passes::diffusion::bssrdf::{BSSRDF, Dipole};
 use crate::passes::pixel_groups;
 use crate::passes::shade::Lit;
+use crate::scene::PosedHead;
+use crate::scene::lamp::GpuLight;
 use crate::scene::view::Seen;
 
 #[cfg(test)]
@@ -51,9 +60,19 @@ const MOST_CELLS: f32 = 4e6;
 
 const SHADER: Module = module!("reference_surface", "surface.wesl");
 
+const NORMALS: Module = module!("surface_normals", "normals.wesl");
+
+/// Intervals of the cosine of incidence in `Params::near_by_cosine`.
+const COSINES: usize = 32;
+
 /// The shader of the passes.
-pub(crate) fn program() -> Program {
-    Program::new(SHADER)
+pub(crate) fn program(directional: bool) -> Program {
+    Program::new(SHADER).with(&[BSSRDF]).flag("directional", directional)
+}
+
+/// The shader of the normals.
+pub(crate) fn normals_program() -> Program {
+    Program::new(NORMALS)
 }
 
 /// Size of the picture with its margin relative to the picture, for light that scatters in from outside.
@@ -75,6 +94,23 @@ pub(crate) struct Params {
     pub(crate) sample_mm2: f32,
     pub(crate) batches: f32,
     pub(crate) near_light: [f32; 4],
+    pub(crate) lamp: [f32; 4],
+    pub(crate) light_index: u32,
+    pub(crate) light_count: u32,
+    pub(crate) padding: [u32; 2],
+    pub(crate) dipole: Dipole,
+    pub(crate) near_by_cosine: [[f32; 4]; COSINES + 1],
+}
+
+/// A light of a batch: all of it, one lamp, or the sky.
+#[derive(Clone, Copy)]
+pub(crate) struct Part<'a> {
+    /// The light of pixels under it alone.
+    pub(crate) lit: &'a Lit,
+    /// The lamp, for light that has a direction.
+    pub(crate) lamp: Option<&'a GpuLight>,
+    /// Its place in the list of lights, and their number.
+    pub(crate) index: [u32; 2],
 }
 
 /// A sample as the shaders read it.
@@ -212,12 +248,26 @@ pub(crate) struct Surface {
     profile: wgpu::Buffer,
     half_width_mm: f64,
     near_light: [f32; 4],
+    directional: Option<Directional>,
     sums: wgpu::Buffer,
     squares: wgpu::Buffer,
 }
 
+/// A BSSRDF that knows the direction of the light.
+struct Directional {
+    dipole: Dipole,
+    near_by_cosine: [[f32; 4]; COSINES + 1],
+    /// Sums of a batch over its lights so far.
+    batch_sums: wgpu::Buffer,
+    normals: OnceLock<Image>,
+}
+
 impl Surface {
-    pub(crate) fn new(gpu: &Gpu, profile: &Profile, size: [u32; 2]) -> Self {
+    /// The passes for a profile and a picture.
+    ///
+    /// # Errors
+    /// A directional dipole whose channels refract differently.
+    pub(crate) fn new(gpu: &Gpu, profile: &Profile, size: [u32; 2]) -> Result<Self, RenderError> {
         let half_width_mm = profile.channels.iter().map(|c| c.sample_radius(COVERAGE)).fold(0.0, f64::max);
         let near_mm = NEAR_MM.min(half_width_mm);
         let total = profile.total();
@@ -232,22 +282,63 @@ impl Surface {
             .collect();
         let near = profile.cdf(near_mm).map(|l| l as f32);
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        Self {
-            gather: Kernel::new(gpu, "reference-surface", &program(), "gather"),
-            finish: Kernel::new(gpu, "reference-surface", &program(), "finish"),
+        let directional = Dipole::of(profile)?.map(|dipole| Directional {
+            dipole,
+            near_by_cosine: std::array::from_fn(|i| {
+                let channels = profile.directional().unwrap_or_else(|| unreachable!("it has a dipole"));
+                let cosine = i as f64 / COSINES as f64;
+                let inside = |c: usize| (channels[c].light_inside(near_mm, cosine) / total[c]) as f32;
+                [inside(0), inside(1), inside(2), 0.0]
+            }),
+            batch_sums: gpu.storage_zeroed("sums of a batch", 16 * pixels),
+            normals: OnceLock::new(),
+        });
+        let program = program(directional.is_some());
+        Ok(Self {
+            gather: Kernel::new(gpu, "reference-surface", &program, "gather"),
+            finish: Kernel::new(gpu, "reference-surface", &program, "finish"),
+            directional,
             profile: gpu.storage("profile", &table),
             half_width_mm,
             near_light: [near[0], near[1], near[2], 0.0],
             sums: gpu.storage_zeroed("sums", 16 * pixels),
             squares: gpu.storage_zeroed("squares", 16 * pixels),
-        }
+        })
+    }
+
+    /// Whether lamps have to be gathered one by one.
+    pub(crate) fn is_directional(&self) -> bool {
+        self.directional.is_some()
+    }
+
+    /// Finds the normals of pixels, which a directional BSSRDF needs before the first batch.
+    pub(crate) fn record_normals(&self, r: &mut Recorder<'_>, seen: &Seen, heads: &[PosedHead<'_>]) {
+        let Some(directional) = &self.directional else { return };
+        let kernel = Kernel::new(r.gpu, "reference-surface", &normals_program(), "pixel_normals");
+        let normals = r.image("normals", ImageSpec::light(seen.ids.size()));
+        let numbers: Vec<_> = heads.iter().map(|h| r.uniform("head", &[h.index, 0, 0, 0])).collect();
+        let each = heads.iter().zip(&numbers).map(|(h, number)| {
+            let resources = vec![
+                ("view", seen.view.bound()),
+                ("head", number.bound()),
+                ("positions", h.positions.bound()),
+                ("vertices", h.head.vertices.bound()),
+                ("triangles", h.head.triangles.bound()),
+                ("frames", h.tangent_frames.bound()),
+                ("visible", seen.ids.bound()),
+                ("normals", normals.bound()),
+            ];
+            (resources, pixel_groups(seen.ids.size()))
+        });
+        r.dispatch_each(&kernel, each);
+        let _ = directional.normals.set(normals);
     }
 
     /// Adds batch number `batch` of one head. `light` records the pass that finds the light of samples.
     pub(crate) fn record_batch(
         &self,
         r: &mut Recorder<'_>,
-        (seen, lit): (&Seen, &Lit),
+        (seen, part): (&Seen, Part<'_>),
         (head, skin): (u32, &Skin),
         batch: u32,
         light: &dyn Fn(&mut Recorder<'_>, &wgpu::Buffer, &wgpu::Buffer),
@@ -267,18 +358,25 @@ impl Surface {
             sample_mm2: (skin.total_mm2() / BATCH as f64) as f32,
             batches: batch as f32,
             near_light: self.near_light,
+            lamp: part.lamp.map_or([0.0, 0.0, 0.0, -1.0], |l| l.position),
+            light_index: part.index[0],
+            light_count: part.index[1],
+            padding: [0; 2],
+            dipole: self.directional.as_ref().map_or(bytemuck::Zeroable::zeroed(), |d| d.dipole),
+            near_by_cosine: self.directional.as_ref().map_or([[0.0; 4]; COSINES + 1], |d| d.near_by_cosine),
         };
         let params = r.uniform("reference-surface", &params);
         let samples = r.gpu.storage("surface samples", &samples);
-        let sample_light = r.gpu.storage_zeroed("sample light", 16 * BATCH as u64);
+        let lights = if self.directional.is_some() { 2 } else { 1 };
+        let sample_light = r.gpu.storage_zeroed("sample light", lights * 16 * BATCH as u64);
         let starts = r.gpu.storage("cell starts", &starts);
         light(r, &samples, &sample_light);
-        let resources = [
+        let mut resources = vec![
             ("view", seen.view.bound()),
             ("params", params.bound()),
             ("visible", seen.ids.bound()),
-            ("irradiance", lit.irradiance.bound()),
-            ("albedo", lit.albedo.bound()),
+            ("irradiance", part.lit.irradiance.bound()),
+            ("albedo", part.lit.albedo.bound()),
             ("depth", seen.depth.bound()),
             ("profile", self.profile.bound()),
             ("starts", starts.bound()),
@@ -287,7 +385,11 @@ impl Surface {
             ("sums", self.sums.bound()),
             ("squares", self.squares.bound()),
         ];
-        r.dispatch(&self.gather, &resources, pixel_groups(lit.irradiance.size()));
+        if let Some(directional) = &self.directional {
+            resources.push(("batch_sums", directional.batch_sums.bound()));
+            resources.extend(directional.normals.get().map(|n| ("normals", n.bound())));
+        }
+        r.dispatch(&self.gather, &resources, pixel_groups(seen.ids.size()));
     }
 
     /// The mean of all batches; unscattered pixels keep their light.

@@ -31,11 +31,11 @@
 //! coordinates.
 
 pub(crate) mod plan;
-pub(crate) mod through;
 #[cfg(test)]
 mod reference;
 #[cfg(test)]
 mod tests;
+pub(crate) mod through;
 
 use std::sync::Arc;
 
@@ -50,6 +50,7 @@ use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
 use crate::error::RenderError;
+use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::pixel_groups;
 use crate::passes::shade::{self, Lighting, Lit};
 use crate::scene::head::Surface;
@@ -152,6 +153,7 @@ struct Maps {
 
 /// The method, ready for one profile.
 pub(crate) struct TextureSpace {
+    rasteriser: Rasteriser,
     name: String,
     side: u32,
     gaussians: Vec<RgbGaussian>,
@@ -171,7 +173,12 @@ pub(crate) struct TextureSpace {
 impl TextureSpace {
     /// # Errors
     /// The profile cannot be fitted.
-    pub(crate) fn new(gpu: &Gpu, profile: &Profile, side: u32) -> Result<Self, RenderError> {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        rasteriser: Rasteriser,
+        profile: &Profile,
+        side: u32,
+    ) -> Result<Self, RenderError> {
         let mut gaussians = gauss::gaussians(profile, TERMS)?;
         // All light that enters leaves: the albedo is the share that is absorbed.
         for c in 0..3 {
@@ -186,7 +193,13 @@ impl TextureSpace {
             side,
             gaussians,
             reach_mm: REACH * widest_mm2.sqrt(),
-            light: Kernel::new(gpu, "scatter light", &light_program(), "light"),
+            rasteriser,
+            light: Kernel::new(
+                gpu,
+                "scatter light",
+                &light_program().flag("stored_shadows", rasteriser.stores_depth()),
+                "light",
+            ),
             along_u: Kernel::new(gpu, "scatter along u", &blur_program(), "along_u"),
             across_u: Kernel::new(gpu, "scatter across u", &blur_program(), "across_u"),
             gather: Kernel::new(gpu, "scatter gather", &gather_program(), "gather"),
@@ -247,23 +260,25 @@ impl TextureSpace {
         for head in frame.heads {
             let Some(layout) = self.layout(head) else { continue };
             let map = self.map(frame, head, layout);
-            let [light, stretch] = ["light map", "stretch map"].map(|label| r.image(label, ImageSpec::light([map.side; 2])));
+            let [light, stretch] =
+                ["light map", "stretch map"].map(|label| r.image(label, ImageSpec::light([map.side; 2])));
             numbers.push((r.uniform("map", &map), r.uniform("shade maps", &shade::params(&lighting, head))));
             let plan = plan(&self.gaussians, f64::from(map.mm_per_texel));
             maps.push(Maps { map, plan, light, stretch, blurred: Vec::new(), through: None });
         }
-        let each = frame.heads.iter().zip(maps.iter().zip(&numbers)).filter_map(|(head, (maps, (map, params)))| {
-            let layout = self.layout(head)?;
-            let mut resources = frame.shade.resources(&lighting, head, params);
-            resources.extend([
-                ("map", map.bound()),
-                ("places", layout.places.bound()),
-                ("texel_from_uv", layout.texel_from_uv.bound()),
-                ("light_out", maps.light.bound()),
-                ("stretch_out", maps.stretch.bound()),
-            ]);
-            Some((resources, pixel_groups([maps.map.side; 2])))
-        });
+        let each =
+            frame.heads.iter().zip(maps.iter().zip(&numbers)).filter_map(|(head, (maps, (map, params)))| {
+                let layout = self.layout(head)?;
+                let mut resources = frame.shade.resources(&lighting, head, params);
+                resources.extend([
+                    ("map", map.bound()),
+                    ("places", layout.places.bound()),
+                    ("texel_from_uv", layout.texel_from_uv.bound()),
+                    ("light_out", maps.light.bound()),
+                    ("stretch_out", maps.stretch.bound()),
+                ]);
+                Some((resources, pixel_groups([maps.map.side; 2])))
+            });
         r.dispatch_each(&self.light, each.collect::<Vec<_>>());
         self.maps = maps;
     }
@@ -292,13 +307,19 @@ impl TextureSpace {
             }
             let each: Vec<_> = (passes.iter())
                 .map(|(h, source, scratch, _, along, _)| {
-                    (blur_resources(&self.linear, &self.maps[*h].stretch, along, [source, scratch]), pixel_groups(scratch.size()))
+                    (
+                        blur_resources(&self.linear, &self.maps[*h].stretch, along, [source, scratch]),
+                        pixel_groups(scratch.size()),
+                    )
                 })
                 .collect();
             r.dispatch_each(&self.along_u, each);
             let each: Vec<_> = (passes.iter())
                 .map(|(h, _, scratch, blurred, _, across)| {
-                    (blur_resources(&self.linear, &self.maps[*h].stretch, across, [scratch, blurred]), pixel_groups(scratch.size()))
+                    (
+                        blur_resources(&self.linear, &self.maps[*h].stretch, across, [scratch, blurred]),
+                        pixel_groups(scratch.size()),
+                    )
                 })
                 .collect();
             r.dispatch_each(&self.across_u, each);
@@ -328,8 +349,9 @@ impl Layout {
     fn new(gpu: &Gpu, surface: &Arc<Surface>, side: u32, reach_mm: f64) -> Result<Self, String> {
         // Triangles of skin, and their numbers in the head's list.
         let skin = Material::Skin.number();
-        let numbers: Vec<u32> =
-            (0..surface.triangles.len() as u32).filter(|t| surface.triangles[*t as usize][3] == skin).collect();
+        let numbers: Vec<u32> = (0..surface.triangles.len() as u32)
+            .filter(|t| surface.triangles[*t as usize][3] == skin)
+            .collect();
         let triangles: Vec<[u32; 3]> = (numbers.iter())
             .map(|t| {
                 let [a, b, c, _] = surface.triangles[*t as usize];
@@ -376,7 +398,8 @@ fn nearest_pixel_mm(frame: &Before<'_>, head: &PosedHead<'_>) -> f32 {
     let (low, high) = head.head.bounds;
     let camera = head.world_from_head.inverse().transform_point3(frame.scene.camera.position);
     let distance = camera.distance(camera.clamp(low, high)) - ROOM_METRES;
-    let pixels_per_radian = 0.5 * frame.size[1] as f32 / (0.5 * frame.scene.camera.fov_degrees.to_radians()).tan();
+    let pixels_per_radian =
+        0.5 * frame.size[1] as f32 / (0.5 * frame.scene.camera.fov_degrees.to_radians()).tan();
     MM_PER_METRE * distance.max(0.0) / pixels_per_radian
 }
 
@@ -417,8 +440,7 @@ impl Diffusion for TextureSpace {
         // Images of the frame before may be used again.
         self.maps.clear();
         self.record_light(r, frame);
-        let margins: Vec<u32> =
-            frame.heads.iter().filter_map(|h| Some(self.layout(h)?.margin)).collect();
+        let margins: Vec<u32> = frame.heads.iter().filter_map(|h| Some(self.layout(h)?.margin)).collect();
         self.record_blurs(r, &margins);
         if frame.quality.transmit == TransmitMethod::TranslucentShadowMap {
             self.record_through(r, frame);
@@ -427,7 +449,13 @@ impl Diffusion for TextureSpace {
         }
     }
 
-    fn after_shading(&mut self, r: &mut Recorder<'_>, heads: &[PosedHead<'_>], seen: &Seen, lit: &Lit) -> Image {
+    fn after_shading(
+        &mut self,
+        r: &mut Recorder<'_>,
+        heads: &[PosedHead<'_>],
+        seen: &Seen,
+        lit: &Lit,
+    ) -> Image {
         if heads.is_empty() || self.maps.len() != heads.len() {
             return lit.irradiance.clone();
         }
@@ -468,7 +496,8 @@ impl Diffusion for TextureSpace {
 impl Maps {
     fn numbers(&self, head: u32) -> Gather {
         let mut weights = [[0.0; 4]; TERMS + 2];
-        let all = [self.plan.own, self.plan.unblurred].into_iter().chain(self.plan.steps.iter().map(|s| s.weights));
+        let all =
+            [self.plan.own, self.plan.unblurred].into_iter().chain(self.plan.steps.iter().map(|s| s.weights));
         for (slot, w) in weights.iter_mut().zip(all) {
             *slot = [w[0] as f32, w[1] as f32, w[2] as f32, 0.0];
         }

@@ -23,6 +23,7 @@ use super::{Blur, COMMON, Map, TERMS, TextureSpace, blur_resources};
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
 use crate::passes::diffusion::Before;
+use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::geometry::visibility::Visibility;
 use crate::passes::pixel_groups;
 use crate::passes::shade::{self, Lighting};
@@ -65,11 +66,13 @@ pub(crate) struct Through {
 }
 
 impl Through {
-    pub(crate) fn new(gpu: &Gpu) -> Self {
+    pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
+        let program = program().flag("stored_shadows", rasteriser.stores_depth());
         Self {
-            visibility: Visibility::new(gpu),
-            thickness: Kernel::new(gpu, "scatter thickness", &program(), "thickness"),
-            pass_through: Kernel::new(gpu, "scatter through", &program(), "pass_through"),
+            // Of the raster units: the other way keeps keys for one size of picture.
+            visibility: Visibility::new(gpu, Rasteriser::Hardware),
+            thickness: Kernel::new(gpu, "scatter thickness", &program, "thickness"),
+            pass_through: Kernel::new(gpu, "scatter through", &program, "pass_through"),
         }
     }
 
@@ -77,7 +80,8 @@ impl Through {
     fn lamp_ids(&self, r: &mut Recorder<'_>, frame: &Before<'_>) -> Image {
         // Half of a shadow map: it has no edges that would show.
         let side = (frame.quality.shadow_size / 2).max(1);
-        let shadowed: Vec<_> = frame.light.lights.iter().filter(|l| l.shape[1] >= 0.0 && l.shape[3] > 0.0).collect();
+        let shadowed: Vec<_> =
+            frame.light.lights.iter().filter(|l| l.shape[1] >= 0.0 && l.shape[3] > 0.0).collect();
         let layers = frame.light.shadows.texture().depth_or_array_layers();
         let spec = ImageSpec::attachment([side; 2], wgpu::TextureFormat::R32Uint).layers(layers);
         let all = r.image("lamp ids", spec.also(wgpu::TextureUsages::COPY_DST));
@@ -102,7 +106,7 @@ impl Through {
 impl TextureSpace {
     /// Light that comes through each head.
     pub(super) fn record_through(&mut self, r: &mut Recorder<'_>, frame: &Before<'_>) {
-        let through = self.through.take().unwrap_or_else(|| Through::new(r.gpu));
+        let through = self.through.take().unwrap_or_else(|| Through::new(r.gpu, self.rasteriser));
         let ids = through.lamp_ids(r, frame);
         let seen = Seen {
             view: frame.view.clone(),
@@ -117,10 +121,16 @@ impl TextureSpace {
             transmittance: None,
             quality: frame.quality,
         };
-        let lamps = frame.light.lights.iter().rposition(|l| l.shape[1] >= 0.0 && l.shape[3] > 0.0).map_or(0, |i| i + 1);
+        let lamps = frame
+            .light
+            .lights
+            .iter()
+            .rposition(|l| l.shape[1] >= 0.0 && l.shape[3] > 0.0)
+            .map_or(0, |i| i + 1);
         let thickness_maps = lamps.min(MAX_LIGHTS).div_ceil(LAMPS_A_MAP).max(1);
         for (h, head) in frame.heads.iter().enumerate() {
-            let Some(layout) = self.layouts.iter().find(|l| std::sync::Arc::ptr_eq(&l.surface, &head.head.surface))
+            let Some(layout) =
+                self.layouts.iter().find(|l| std::sync::Arc::ptr_eq(&l.surface, &head.head.surface))
             else {
                 continue;
             };
@@ -158,18 +168,23 @@ impl TextureSpace {
             };
             let deviation_mm = self.gaussians.get(THICKNESS_BLUR).map_or(0.0, |g| g.variance_mm2.sqrt());
             for numbers in &all {
-                let [sharp, scratch, smooth] =
-                    ["thickness", "thickness scratch", "thickness"].map(|label| r.image(label, ImageSpec::light(size)));
+                let [sharp, scratch, smooth] = ["thickness", "thickness scratch", "thickness"]
+                    .map(|label| r.image(label, ImageSpec::light(size)));
                 let mut resources = common();
                 resources.extend([("through", numbers.bound()), ("thickness_out", sharp.bound())]);
                 r.dispatch(&through.thickness, &resources, pixel_groups(size));
-                let blur = r.uniform("blur", &Blur {
-                    deviation_mm: deviation_mm as f32,
-                    most_texels: (layout.margin >> maps.map.level).max(1) as f32,
-                    source_scale: 1.0 / (1u32 << LEVEL) as f32,
-                    level: LEVEL,
-                });
-                for (kernel, images) in [(&self.along_u, [&sharp, &scratch]), (&self.across_u, [&scratch, &smooth])] {
+                let blur = r.uniform(
+                    "blur",
+                    &Blur {
+                        deviation_mm: deviation_mm as f32,
+                        most_texels: (layout.margin >> maps.map.level).max(1) as f32,
+                        source_scale: 1.0 / (1u32 << LEVEL) as f32,
+                        level: LEVEL,
+                    },
+                );
+                for (kernel, images) in
+                    [(&self.along_u, [&sharp, &scratch]), (&self.across_u, [&scratch, &smooth])]
+                {
                     let resources = blur_resources(&self.linear, &maps.stretch, &blur, images);
                     r.dispatch(kernel, &resources, pixel_groups(size));
                 }
@@ -178,7 +193,9 @@ impl TextureSpace {
             let out = r.image("through", ImageSpec::light(size));
             let mut resources = common();
             resources.extend([("through", all[0].bound()), ("through_out", out.bound())]);
-            for (i, name) in ["thickness_0", "thickness_1", "thickness_2"].into_iter().enumerate().take(THICKNESS_MAPS) {
+            for (i, name) in
+                ["thickness_0", "thickness_1", "thickness_2"].into_iter().enumerate().take(THICKNESS_MAPS)
+            {
                 resources.push((name, thickness[i.min(thickness.len() - 1)].bound()));
             }
             for (i, name) in super::MAP_NAMES.into_iter().enumerate() {

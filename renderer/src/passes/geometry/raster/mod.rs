@@ -48,6 +48,11 @@ pub(crate) enum Rasteriser {
 }
 
 impl Rasteriser {
+    /// Whether depth is in images of floats, which no comparison sampler reads and no raster unit tests.
+    pub(crate) fn stores_depth(self) -> bool {
+        self != Self::Hardware
+    }
+
     /// This pass on a device.
     pub(crate) fn compute(gpu: &Gpu) -> Self {
         Self::Compute { wide: gpu.device.features().contains(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX) }
