@@ -1,6 +1,7 @@
 //! Heads to files.
 
 pub mod curves;
+mod eye_mouth;
 pub mod gltf;
 mod image_codec;
 mod performance;
