@@ -14,6 +14,13 @@ pub const NAME: &str = "RUBOR_facial_appearance";
 /// Version written and read here.
 pub const VERSION: u32 = 1;
 
+/// In the copy of the extension in the extras of the mesh: names of images by their index in the extension.
+pub(crate) const IMAGE_NAMES: &str = "imageNames";
+/// Names of accessors by their index in the extension.
+pub(crate) const ACCESSOR_NAMES: &str = "accessorNames";
+/// Fields that are indices of accessors of the head's geometry.
+pub(crate) const ACCESSOR_FIELDS: [&str; 2] = ["points", "changes"];
+
 /// Root object of the extension.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]

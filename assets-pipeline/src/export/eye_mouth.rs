@@ -73,9 +73,8 @@ fn iris_colors(hair_linear: [f32; 3]) -> [Vec3; 2] {
     let hazel = [Vec3::new(0.108, 0.061, 0.030), Vec3::new(0.054, 0.051, 0.037)];
     let blue = [Vec3::new(0.125, 0.120, 0.095), Vec3::new(0.078, 0.105, 0.122)];
     let (first, second) = (smoothstep(0.0100, 0.0122, hair), smoothstep(0.05, 0.16, hair));
-    [0, 1].map(|i| {
-        brown[i] * (1.0 - first) + hazel[i] * (first * (1.0 - second)) + blue[i] * (first * second)
-    })
+    [0, 1]
+        .map(|i| brown[i] * (1.0 - first) + hazel[i] * (first * (1.0 - second)) + blue[i] * (first * second))
 }
 
 /// Iris with fibres, collarette, crypts and limbal ring, pupil, sclera with vessels; of the head's hair colour.
@@ -163,7 +162,8 @@ pub(super) fn teeth() -> Picture {
         enamel *= Vec3::ONE.lerp(Vec3::new(0.42, 0.30, 0.24), seam);
         let flesh = Vec3::new(0.36, 0.125, 0.115) * (0.8 + 0.4 * smoothstep(0.0, 1.0, across.abs()));
         // The cheeks close in on the side teeth, which reflect their red.
-        let color = enamel.lerp(flesh, gum).lerp(Vec3::new(0.20, 0.075, 0.065), 0.9 * smoothstep(13.0, 26.0, s));
+        let color =
+            enamel.lerp(flesh, gum).lerp(Vec3::new(0.20, 0.075, 0.065), 0.9 * smoothstep(13.0, 26.0, s));
         color * (1.0 - 0.85 * smoothstep(7.0, 32.0, s))
     })
 }

@@ -124,7 +124,9 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     }
     if is("usda") {
         if arguments.compress {
-            return Err(Failure::input("--compress: USD has no such coding, expected a name that ends in .glb"));
+            return Err(Failure::input(
+                "--compress: USD has no such coding, expected a name that ends in .glb",
+            ));
         }
         let options = usd::Options {
             color_map_size: if arguments.small { 1024 } else { 2048 },
@@ -148,7 +150,11 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         morph_normals: !arguments.small,
         shape_colors: !arguments.no_colors,
         compress: arguments.compress,
-        maps: if arguments.small || arguments.compress { MapEncodings::small() } else { MapEncodings::default() },
+        maps: if arguments.small || arguments.compress {
+            MapEncodings::small()
+        } else {
+            MapEncodings::default()
+        },
         shapes,
         rig: Some(&rig),
         sequence: sequence.as_ref(),

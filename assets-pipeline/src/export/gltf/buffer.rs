@@ -295,9 +295,11 @@ impl Buffer {
             kept.iter().for_each(|(i, [r, g, b])| values[*i as usize] = [*r, *g, *b, 0]);
             let view = self.view(bytemuck::cast_slice(values.as_flattened()), Target::Vertices);
             self.views[view]["byteStride"] = json!(4);
-            return Some(self.accessor(json!({
+            let mut accessor = json!({
                 "bufferView": view, "componentType": BYTE, "normalized": true, "count": count, "type": "VEC3",
-            })));
+            });
+            set_bounds(&mut accessor, values.iter().map(|[r, g, b, _]| [r, g, b].map(|c| f32::from(*c))));
+            return Some(self.accessor(accessor));
         }
         let indices: Vec<u32> = kept.iter().map(|(i, _)| *i).collect();
         let values: Vec<[i8; 3]> = kept.iter().map(|(_, c)| *c).collect();
@@ -305,6 +307,7 @@ impl Buffer {
         let value_view = self.view(bytemuck::cast_slice(values.as_flattened()), Target::None);
         let mut accessor = sparse(BYTE, count, kept.len(), (index_view, component), value_view);
         accessor["normalized"] = json!(true);
+        set_bounds(&mut accessor, values.iter().map(|c| c.map(f32::from)).chain([[0.0; 3]]));
         Some(self.accessor(accessor))
     }
 
@@ -318,9 +321,28 @@ impl Buffer {
         self.accessor(accessor)
     }
 
-    /// An encoded image.
+    /// Names an accessor, so that it is found again where programs renumber it.
+    pub(super) fn name_accessor(&mut self, index: u32, name: String) {
+        self.accessors[index as usize]["name"] = json!(name);
+    }
+
+    /// Index and name of what has one.
+    pub(super) fn named_accessors(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.accessors.iter().enumerate().filter_map(|(i, a)| Some((i, a["name"].as_str()?)))
+    }
+
+    /// Names of all images.
+    pub(super) fn image_names(&self) -> impl Iterator<Item = &str> {
+        self.images.iter().filter_map(|i| i["name"].as_str())
+    }
+
+    /// An encoded image, under a name of its own.
     pub(super) fn image(&mut self, name: &str, bytes: &[u8], mime_type: &str) -> usize {
         let view = self.view(bytes, Target::None);
+        let is_taken = |name: &str| self.images.iter().any(|i| i["name"] == name);
+        let numbered = (2..).map(|n| format!("{name} {n}"));
+        let name =
+            std::iter::once(name.to_owned()).chain(numbered).find(|n| !is_taken(n)).unwrap_or_default();
         self.images.push(json!({"name": name, "bufferView": view, "mimeType": mime_type}));
         self.images.len() - 1
     }
@@ -333,7 +355,8 @@ impl Buffer {
         }
         document["buffers"] = json!([{"byteLength": self.bytes.len()}]);
         if self.fallback_bytes > 0 {
-            let fallback = json!({"byteLength": self.fallback_bytes, "extensions": {meshopt::NAME: {"fallback": true}}});
+            let fallback =
+                json!({"byteLength": self.fallback_bytes, "extensions": {meshopt::NAME: {"fallback": true}}});
             document["buffers"].as_array_mut().map(|buffers| buffers.push(fallback));
         }
         document["bufferViews"] = Value::Array(self.views);

@@ -127,16 +127,12 @@ pub(super) fn primitives(
                 vertices.iter().map(|v| head.authored.second_uv(*v)).map(|uv| uv.to_array()).collect();
             if !head.authored.second_uvs.is_empty() {
                 primitive["attributes"]["TEXCOORD_1"] =
-                    json!(buffer.floats(
-                    &second,
-                    Target::Vertices,
-                    false,
-                    buffer::TEXTURE_COORDINATE
-                ));
+                    json!(buffer.floats(&second, Target::Vertices, false, buffer::TEXTURE_COORDINATE));
             }
             let colors: Vec<_> = vertices.iter().map(|v| head.authored.color_linear(*v)).collect();
             if !head.authored.colors_linear.is_empty() {
-                primitive["attributes"]["COLOR_0"] = json!(buffer.floats(&colors, Target::Vertices, false, buffer::COLOR));
+                primitive["attributes"]["COLOR_0"] =
+                    json!(buffer.floats(&colors, Target::Vertices, false, buffer::COLOR));
             }
         }
         // Every target must be there on every primitive; those that do not move it share one empty accessor.

@@ -39,6 +39,16 @@ pub(super) struct Materials {
 }
 
 impl Materials {
+    /// Shows every image in a texture, also those of the extension alone: some programs keep no others.
+    pub(super) fn show_all(&mut self, images: usize) {
+        let shown = |t: &Value| t["source"].as_u64().or(t["extensions"][WEBP]["source"].as_u64());
+        for image in 0..images {
+            if !self.textures.iter().any(|t| shown(t) == Some(image as u64)) {
+                self.textures.push(json!({"sampler": 0, "source": image}));
+            }
+        }
+    }
+
     pub(super) fn put_into(self, document: &mut Value) {
         document["materials"] = Value::Array(self.materials);
         if let Some(used) = document["extensionsUsed"].as_array_mut() {
@@ -259,7 +269,8 @@ pub(super) fn write(
                 material["occlusionTexture"] = gloss.clone();
             }
             if let Some(specular) = &specular {
-                material["extensions"][SPECULAR] = json!({"specularFactor": 1.0, "specularTexture": specular});
+                material["extensions"][SPECULAR] =
+                    json!({"specularFactor": 1.0, "specularTexture": specular});
             }
         }
         if !part.material.is_opaque() {

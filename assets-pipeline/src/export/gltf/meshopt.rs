@@ -156,7 +156,10 @@ mod tests {
             for (i, unit) in units.iter().enumerate() {
                 let c: [f32; 4] = std::array::from_fn(|k| match bits {
                     8 => f32::from(bytes[4 * i + k] as i8) / 127.0,
-                    _ => f32::from(i16::from_le_bytes([bytes[8 * i + 2 * k], bytes[8 * i + 2 * k + 1]])) / 32767.0,
+                    _ => {
+                        f32::from(i16::from_le_bytes([bytes[8 * i + 2 * k], bytes[8 * i + 2 * k + 1]]))
+                            / 32767.0
+                    }
                 });
                 let cosine = glam::Vec3::from_slice(&c).normalize().dot(glam::Vec3::from_slice(unit));
                 assert!(cosine.min(1.0).acos().to_degrees() < most_degrees, "{unit:?} is {c:?}");

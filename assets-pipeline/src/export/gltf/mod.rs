@@ -37,7 +37,9 @@ use super::performance::{Performance, PerformanceCurves};
 use super::skin_color::shape_colors;
 use super::{TextureFormat, write_whole};
 use crate::error::ExportError;
-use crate::facial_appearance::{FacialAppearance, NAME, ShapeOcclusionEntry, VERSION};
+use crate::facial_appearance::{
+    ACCESSOR_NAMES, FacialAppearance, IMAGE_NAMES, NAME, ShapeOcclusionEntry, VERSION,
+};
 
 /// Contents of the file besides the head.
 #[derive(Clone, Debug)]
@@ -147,10 +149,9 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
         colors: colors.as_ref(),
         shape_visibility: options.morph_normals || options.shape_colors,
     };
-    let (primitives, parts) =
-        geometry::primitives(head, &kept, &targets, &mut buffer);
+    let (primitives, parts) = geometry::primitives(head, &kept, &targets, &mut buffer);
     let factor = colors.as_ref().map_or(1.0, |c| 1.0 / c.rest);
-    let materials = materials::write(head, options, factor, &mut buffer)?;
+    let mut materials = materials::write(head, options, factor, &mut buffer)?;
     let maps = maps::write(&head.maps, &options.maps, &mut buffer)?;
     let occlusion = (!head.mesh.occlusion.is_empty()).then(|| buffer.normalized(&head.mesh.occlusion) as u32);
     let shape_occlusion = (kept.iter().map(|s| &head.shapes[*s]).filter(|s| !s.occlusion.is_empty()))
@@ -190,14 +191,17 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
         rig: options.rig.map(|rig| as_json("rig", serde_json::to_value(rig))).transpose()?,
         sequence: options.sequence.map(|s| as_json("sequence", serde_json::to_value(s))).transpose()?,
     };
+    let copy = copy_for_extras(&extension, &mut buffer)
+        .map_err(|e| ExportError::Encode { what: NAME.into(), reason: e.to_string() })?;
     let names: Vec<&str> = kept.iter().map(|s| head.shapes[*s].name.as_str()).collect();
-    let mut mesh = json!({"name": head.name, "primitives": primitives});
+    let mut mesh = json!({"name": head.name, "primitives": primitives, "extras": {NAME: copy}});
     if !names.is_empty() {
         let units: Map<String, Value> = (names.iter())
             .filter(|n| !action_units(n).is_empty())
             .map(|n| ((*n).to_owned(), json!(action_units(n))))
             .collect();
-        mesh["extras"] = json!({"targetNames": names, "actionUnits": units});
+        mesh["extras"]["targetNames"] = json!(names);
+        mesh["extras"]["actionUnits"] = json!(units);
         let rest = |s: &usize| options.pose.as_ref().and_then(|p| p.shapes.get(*s)).copied().unwrap_or(0.0);
         mesh["weights"] = json!(kept.iter().map(rest).collect::<Vec<f32>>());
     }
@@ -210,6 +214,7 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
         "extensionsUsed": [NAME],
         "extensions": {NAME: extension},
     });
+    materials.show_all(buffer.image_names().count());
     materials.put_into(&mut document);
     if options.compress {
         for list in ["extensionsUsed", "extensionsRequired"] {
@@ -232,6 +237,27 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
         note_baked(rig, head, &mut notes);
     }
     Ok(Exported { bytes: buffer.finish(document)?, notes, keys })
+}
+
+/// The extension for the extras of the mesh, where programs keep it that do not know it: with names of the images and accessors
+/// that it counts, as these programs renumber them.
+fn copy_for_extras(extension: &FacialAppearance, buffer: &mut Buffer) -> Result<Value, serde_json::Error> {
+    for (i, part) in extension.parts.iter().enumerate() {
+        buffer.name_accessor(part.points, format!("rubor points of part {i}"));
+    }
+    if let Some(occlusion) = extension.occlusion {
+        buffer.name_accessor(occlusion, "rubor ambient visibility".into());
+    }
+    for entry in &extension.shape_occlusion {
+        buffer.name_accessor(entry.points, format!("rubor points of visibility of {}", entry.shape));
+        buffer.name_accessor(entry.changes, format!("rubor changes of visibility of {}", entry.shape));
+    }
+    let mut copy = serde_json::to_value(extension)?;
+    let accessors = buffer.named_accessors().map(|(i, name)| (i.to_string(), json!(name)));
+    copy[ACCESSOR_NAMES] = Value::Object(accessors.collect());
+    let images = buffer.image_names().enumerate().map(|(i, name)| (i.to_string(), json!(name)));
+    copy[IMAGE_NAMES] = Value::Object(images.collect());
+    Ok(copy)
 }
 
 fn kept_shapes(head: &Head, options: &Options<'_>) -> Result<Vec<usize>, ExportError> {

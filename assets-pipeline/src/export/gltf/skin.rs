@@ -38,9 +38,8 @@ pub(super) fn animation(evaluator: &Evaluator, buffer: &mut Buffer) -> SkinAnima
     let frames: Vec<f64> = (0..evaluator.frame_count()).map(|f| evaluator.frame_time_s(f)).collect();
     let faces: Vec<FaceState> = frames.iter().map(|t| evaluator.face_at(*t)).collect();
     let authored: Vec<_> = frames.iter().map(|t| evaluator.weights_at(*t)).collect();
-    let mut rows = |width: usize, numbers: Vec<f32>| {
-        (width > 0).then(|| buffer.rows(&numbers, width, WEIGHT) as u32)
-    };
+    let mut rows =
+        |width: usize, numbers: Vec<f32>| (width > 0).then(|| buffer.rows(&numbers, width, WEIGHT) as u32);
     let names = |list: &mut dyn Iterator<Item = &str>| list.map(str::to_owned).collect::<Vec<_>>();
     let expressions = names(&mut evaluator.rig().expression_names());
     let states = names(&mut evaluator.rig().state_names());

@@ -113,7 +113,14 @@ pub(super) fn write(
     Ok(())
 }
 
-fn texture(out: &mut String, (path, coordinates): (&str, &str), name: &str, file: &str, color_space: &str, more: &str) {
+fn texture(
+    out: &mut String,
+    (path, coordinates): (&str, &str),
+    name: &str,
+    file: &str,
+    color_space: &str,
+    more: &str,
+) {
     let _ = write!(
         out,
         "\n            def Shader \"{name}\"\n            {{\n                \
