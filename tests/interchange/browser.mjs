@@ -1,6 +1,6 @@
 // three.js and Babylon.js in headless Chromium: vertices at the times of the reference, and a picture of each.
 //
-//   browser.mjs HEAD.glb REFERENCE_FOLDER [BOUND]     prints the largest distance in parts of the head's height
+//   browser.mjs HEAD.glb REFERENCE_FOLDER [BOUND [VIEWER]]     prints the largest distance in parts of the head's height
 //
 // Run from a folder with node_modules (see package.json); CHROMIUM names the browser.
 import { readFileSync, writeFileSync } from "node:fs";
@@ -12,9 +12,10 @@ const reference = JSON.parse(readFileSync(join(folder, "reference.json")));
 const expected = readFileSync(join(folder, "vertices.bin"));
 // In parts of the head's height. A compressed file rounds positions and shapes, so its bound is wider.
 const bound = Number(process.argv[4] ?? 1e-5);
+const viewers = process.argv[5] ? [process.argv[5]] : ["three", "babylon"];
 let failed = false;
 const faults = await withBrowser(glb, async (newPage) => {
-  for (const name of ["three", "babylon"]) {
+  for (const name of viewers) {
     const page = await newPage(`${name}.html`);
     let worst = 0;
     for (const [i, time] of reference.times.entries()) {

@@ -22,6 +22,7 @@ export async function withBrowser(head, work) {
     throw new Error(`no Chromium at ${executablePath ?? candidates.join(", ")}: install one (Debian: apt-get install chromium) or set CHROMIUM`);
   const server = createServer((request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, "http://x").pathname));
+    if (path === "/favicon.ico") return response.writeHead(204).end();
     const roots = { "/node_modules/": process.cwd(), "/three.js/": join(here, "../../docs") };
     const root = Object.keys(roots).find((prefix) => path.startsWith(prefix));
     const file = path === "/head.glb" ? head : join(root ? roots[root] : here, path);
@@ -39,7 +40,7 @@ export async function withBrowser(head, work) {
     await work(async (file, [width, height] = [512, 512]) => {
       const page = await browser.newPage({ viewport: { width, height } });
       page.on("pageerror", (e) => faults.push(`${file}: ${e}`));
-      page.on("console", (m) => m.type() === "error" && !m.text().includes("favicon") && faults.push(`${file}: ${m.text()}`));
+      page.on("console", (m) => m.type() === "error" && faults.push(`${file}: ${m.text()}`));
       page.setDefaultTimeout(300000);
       await page.goto(`http://127.0.0.1:${server.address().port}/${file}`);
       await page.waitForFunction("window.ready !== undefined");

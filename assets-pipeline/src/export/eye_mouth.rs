@@ -120,7 +120,7 @@ pub(super) fn eye(hair_linear: [f32; 3]) -> Picture {
 pub(super) fn has_teeth_coordinates(head: &Head) -> bool {
     let mesh = &head.mesh;
     let mut parts = mesh.parts.iter().filter(|p| p.material == Material::Teeth).peekable();
-    let inside = |uv: Vec2| uv.x.abs() <= 0.6 && (uv.y - 0.5).abs() <= 0.2;
+    let inside = |uv: Vec2| uv.x.abs() <= 0.75 && (uv.y - 0.5).abs() <= 0.25;
     let mut has_left = false;
     let fits = |triangles: &[[u32; 3]], has_left: &mut bool| {
         triangles.as_flattened().iter().map(|v| mesh.vertices[*v as usize].uv).all(|uv| {

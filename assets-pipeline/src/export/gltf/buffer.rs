@@ -74,10 +74,6 @@ impl Buffer {
         Self { is_compressed: true, ..Self::default() }
     }
 
-    pub(super) fn is_compressed(&self) -> bool {
-        self.is_compressed
-    }
-
     /// A view of coded data.
     fn coded_view(&mut self, coded: Result<Coded, ExportError>, target: Target) -> usize {
         let coded = coded.unwrap_or_else(|fault| {

@@ -221,7 +221,7 @@ pub(super) fn write(
     let base_color = texture("base colour", &pictures.base_color)?;
     let normal = texture("normals", &pictures.normals)?;
     let gloss = texture("visibility and roughness", &pictures.gloss)?;
-    let specular = texture("specular", &pictures.specular)?;
+    let specular = texture("strength of reflection", &pictures.specular)?;
     let eye = texture("eye", &pictures.eye)?;
     let teeth = texture("teeth", &pictures.teeth)?;
     let lash = texture("lashes", &pictures.lashes)?;

@@ -32,7 +32,7 @@ pub(super) fn write(
     let lashes = save("lashes", &pictures.lashes)?;
     let out = &mut layer.text;
     out.push_str("    def Scope \"Looks\"\n    {\n");
-    for (part, name) in head.mesh.parts.iter().zip(mesh::looks(head)) {
+    for (index, (part, name)) in head.mesh.parts.iter().zip(mesh::looks(head)).enumerate() {
         let (color, normal, moved) = match part.material {
             Material::Skin => (&base_color, &normals, None),
             Material::Eye => (&eye, &None, Some(EYE_TRANSFORM)),
@@ -40,7 +40,11 @@ pub(super) fn write(
             Material::Lash => (&lashes, &None, None),
             _ => (&None, &None, None),
         };
-        let look = appearance(head, part.material, color.is_some());
+        let mut look = appearance(head, part.material, color.is_some());
+        if let Some(material) = head.authored_material(index).map(|m| &head.authored.materials[m as usize]) {
+            look.color_linear = material.base_color;
+            look.roughness = material.roughness;
+        }
         let path = format!("/rubor_head/Looks/{name}");
         let [r, g, b, alpha] = look.color_linear;
         let _ = write!(
