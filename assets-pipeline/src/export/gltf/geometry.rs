@@ -25,24 +25,23 @@ pub(super) struct TargetOptions<'a> {
 /// their occlusion textures leave lamps alone.
 struct Visibility<'a> {
     of_points: &'a [f32],
-    /// Least factor, and the power of the visibility, as the renderer has them for these materials.
+    /// Least factor, judged on pictures of the default head in three.js beside the renderer's, with and without shadows.
     least: f32,
-    power: f32,
 }
 
 impl<'a> Visibility<'a> {
     fn of(head: &'a Head, material: Material) -> Option<Self> {
-        let (least, power) = match material {
-            Material::Mucosa | Material::Gums => (0.06, 2.0),
-            Material::Teeth => (0.25, 1.0),
-            Material::Eye => (0.4, 1.0),
+        let least = match material {
+            Material::Mucosa | Material::Gums => 0.2,
+            Material::Teeth => 0.45,
+            Material::Eye => 0.7,
             _ => return None,
         };
-        (!head.mesh.occlusion.is_empty()).then_some(Self { of_points: &head.mesh.occlusion, least, power })
+        (!head.mesh.occlusion.is_empty()).then_some(Self { of_points: &head.mesh.occlusion, least })
     }
 
     fn factor(&self, visibility: f32) -> f32 {
-        visibility.clamp(0.0, 1.0).powf(self.power).max(self.least)
+        visibility.clamp(0.0, 1.0).max(self.least)
     }
 
     fn rest(&self, point: u32) -> f32 {
