@@ -1,8 +1,8 @@
 //! Files to heads and back.
 //!
 //! ```text
-//! OBJ set ---------+                                        +--> .glb (one file, any glTF viewer opens it)
-//! glTF / GLB ------+--> import --> Head --> convert --------+--> .usda
+//! OBJ, sets of OBJ +                                        +--> .glb (one file, any glTF viewer opens it)
+//! glTF, VRM, USD --+--> import --> Head --> convert --------+--> .usda, .usdz
 //! MakeHuman data --+                (occlusion, maps)       +--> check: faults and entries without effect
 //! ```
 //!
@@ -38,3 +38,4 @@ pub mod import;
 pub mod notes;
 pub mod poly;
 pub mod synthesize;
+pub mod usdz;

@@ -7,6 +7,7 @@
 //! ```
 //!
 //! ARKit's names are canonical. Letter case, spaces, dashes, underscores and the spelling of a side are ignored.
+//! Names of Character Creator, MetaHuman, VRoid Studio and Oculus Lipsync are in `names/vocabularies.rs`.
 //! ICT FaceKit splits `browInnerUp` and `cheekPuff` into halves: one written name may drive two shapes of a head,
 //! and two written halves share the one shape of a head that has no halves.
 
@@ -14,6 +15,11 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use crate::head::Head;
+
+mod vocabularies;
+
+pub use self::vocabularies::VISEMES;
+use self::vocabularies::{ON_OTHER_HEADS, PREFIXES, SPELLINGS, VROID};
 
 /// The 52 blend shapes of Apple's ARKit face anchor, canonical spelling.
 pub const ARKIT: [&str; 52] = [
@@ -220,10 +226,10 @@ const ON_VRM_HEADS: [(&str, &str, f32); 17] = [
     ("mouthStretchRight", "ih", 0.5),
 ];
 
-/// The VRM preset of a name in any spelling.
-fn vrm_preset(written: &str) -> Option<&'static (&'static str, &'static [(&'static str, f32)])> {
-    let key = Key::new(written);
-    VRM_PRESETS.iter().find(|(name, _)| Key::new(name) == key)
+/// The VRM preset or the viseme of a name in any spelling.
+fn preset(written: &str) -> Option<&'static (&'static str, &'static [(&'static str, f32)])> {
+    let key = Key::spoken(written);
+    VRM_PRESETS.iter().chain(&VISEMES).find(|(name, _)| Key::new(name) == key)
 }
 
 /// Half of the face, the character's own.
@@ -278,6 +284,28 @@ impl Key {
         Self { base, side }
     }
 
+    /// As [`Key::new`], of the name that ARKit and VRM have for what another program calls so.
+    fn spoken(written: &str) -> Self {
+        static CANONICAL: LazyLock<HashMap<Key, Key>> = LazyLock::new(|| {
+            let mut canonical = HashMap::new();
+            for (there, here) in SPELLINGS {
+                if !there.contains('*') {
+                    canonical.insert(Key::new(there), Key::new(here));
+                    continue;
+                }
+                for (letter, word) in [("L", "Left"), ("R", "Right")] {
+                    canonical
+                        .insert(Key::new(&there.replace('*', letter)), Key::new(&here.replace('*', word)));
+                }
+            }
+            canonical
+        });
+        let bare = PREFIXES.iter().find_map(|prefix| written.strip_prefix(prefix)).unwrap_or(written);
+        let bare = bare.find(VROID).map_or(bare, |start| &bare[start..]);
+        let key = Self::new(bare);
+        CANONICAL.get(&key).cloned().unwrap_or(key)
+    }
+
     fn with_side(&self, side: Option<Side>) -> Self {
         Self { base: self.base.clone(), side }
     }
@@ -308,7 +336,7 @@ pub fn canonical(written: &str) -> Option<&'static str> {
         }
         by_key
     });
-    let find = |name: &str| BY_KEY.get(&Key::new(name)).copied();
+    let find = |name: &str| BY_KEY.get(&Key::spoken(name)).copied();
     find(written).or_else(|| find(written.rsplit(['.', ':', '|']).next()?))
 }
 
@@ -319,10 +347,10 @@ pub fn vocabulary() -> impl Iterator<Item = &'static str> {
 
 /// True for a name that [`canonical`] knows, or that is both halves of one: `eyeBlink`, `cheekRaiser`.
 pub fn is_known_shape(written: &str) -> bool {
-    if canonical(written).is_some() || vrm_preset(written).is_some() {
+    if canonical(written).is_some() || preset(written).is_some() {
         return true;
     }
-    let key = Key::new(written);
+    let key = Key::spoken(written);
     key.side.is_none() && key.has_halves() && vocabulary().map(Key::new).any(|k| k.base == key.base)
 }
 
@@ -346,7 +374,7 @@ impl Resolver {
     /// For any list of names; targets are indices into it.
     pub fn new<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
-        let keys = names.iter().map(|n| Key::new(canonical(n).unwrap_or(n))).collect();
+        let keys = names.iter().map(|n| canonical(n).map_or_else(|| Key::spoken(n), Key::new)).collect();
         Self { names, keys }
     }
 
@@ -370,13 +398,13 @@ impl Resolver {
     /// 2. the same name in another spelling,
     /// 3. both halves, for a name without a side (`browInnerUp` on a head with `browInnerUp_L` and `_R`),
     /// 4. the undivided shape at half the weight, for a half (`cheekPuffLeft` on a head with `cheekPuff`),
-    /// 5. the ARKit shapes of a VRM preset, and the presets of a VRM head for an ARKit shape.
+    /// 5. the ARKit shapes of a VRM preset or a viseme, and what a head without ARKit's shapes has for one of them.
     pub fn resolve(&self, written: &str) -> Vec<Target> {
         let targets = self.resolve_name(written);
         if !targets.is_empty() {
             return targets;
         }
-        if let Some((_, shapes)) = vrm_preset(written) {
+        if let Some((_, shapes)) = preset(written) {
             let scaled = |(shape, share): &(&str, f32)| {
                 let share = *share;
                 self.resolve_name(shape).into_iter().map(move |t| Target { factor: share * t.factor, ..t })
@@ -384,14 +412,19 @@ impl Resolver {
             return shapes.iter().flat_map(scaled).collect();
         }
         let Some(shape) = canonical(written) else { return Vec::new() };
-        let presets = ON_VRM_HEADS.iter().filter(|(name, ..)| *name == shape);
-        let whole = |(_, preset, share): &(&str, &str, f32)| {
-            let key = Key::new(preset);
+        let of_head = |(preset, share): (&str, f32)| {
+            let key = Key::spoken(preset);
             let index = self.keys.iter().position(|k| *k == key)?;
-            Some(Target { index: index as u32, factor: *share })
+            Some(Target { index: index as u32, factor: share })
         };
         // The first match is the closer one: `blink` is used only where there is no `blinkLeft`.
-        presets.filter_map(whole).take(1).collect()
+        let presets = ON_VRM_HEADS.iter().filter(|(name, ..)| *name == shape);
+        if let Some(target) = presets.filter_map(|(_, preset, share)| of_head((*preset, *share))).next() {
+            return vec![target];
+        }
+        let others = ON_OTHER_HEADS.iter().filter(|(name, _)| *name == shape);
+        let all = |(_, parts): &(&str, &[(&str, f32)])| parts.iter().map(|part| of_head(*part)).collect();
+        others.map(all).find_map(|found: Option<Vec<Target>>| found).unwrap_or_default()
     }
 
     fn resolve_name(&self, written: &str) -> Vec<Target> {
@@ -399,7 +432,7 @@ impl Resolver {
         if let Some(index) = self.names.iter().position(|n| n == written) {
             return vec![whole(index)];
         }
-        let key = Key::new(canonical(written).unwrap_or(written));
+        let key = canonical(written).map_or_else(|| Key::spoken(written), Key::new);
         let find = |key: &Key| self.keys.iter().position(|k| k == key);
         if let Some(index) = find(&key) {
             return vec![whole(index)];
@@ -663,6 +696,62 @@ mod tests {
         assert_eq!(resolved(&one, "eyeBlinkRight"), [("Blink".to_owned(), 0.5)]);
         // Zones and distributions have names of their own.
         assert!(Resolver::new(["joy", "forehead"]).resolve("happy").is_empty());
+    }
+
+    #[test]
+    fn names_of_other_programs_are_those_of_arkit() {
+        for (written, expected) in [
+            ("Brow_Drop_L", "browDownLeft"),
+            ("Brow_Raise_Inner_R", "browInnerUpRight"),
+            ("Eye_Blink_L", "eyeBlinkLeft"),
+            ("Eye_R_Look_L", "eyeLookInRight"),
+            ("Mouth_Up_Upper_R", "mouthUpperUpRight"),
+            ("Mouth_L", "mouthLeft"),
+            ("Jaw_Forward", "jawForward"),
+            ("CTRL_expressions_browDownL", "browDownLeft"),
+            ("CTRL_expressions.mouthCornerPullR", "mouthSmileRight"),
+            ("CTRL_expressions_eyeLookLeftR", "eyeLookInRight"),
+            ("CTRL_expressions_jawFwd", "jawForward"),
+            ("CTRL_expressions_eyePupilWideL", "pupilDilateLeft"),
+            ("Fcl_EYE_Close_R", "eyeBlinkRight"),
+            ("Face.M_F00_000_00_Fcl_EYE_Close_L", "eyeBlinkLeft"),
+        ] {
+            assert_eq!(canonical(written), Some(expected), "{written}");
+            // Both ways: a head with the one name follows the other.
+            assert_eq!(resolved(&Resolver::new([written]), expected), [(written.to_owned(), 1.0)]);
+            assert_eq!(resolved(&Resolver::new([expected]), written), [(expected.to_owned(), 1.0)]);
+        }
+        for (_, here) in SPELLINGS {
+            let known = here.replace("_*", "").replace('*', "Left");
+            assert!(is_known_shape(&known), "{here} is no name of ours");
+        }
+        for own in ["CTRL_expressions_earUpL", "Nose_Nostril_Dilate_L", "Fcl_HA_Hide", "viseme_sil"] {
+            assert!(canonical(own).is_none() && !is_known_shape(own), "{own}");
+        }
+    }
+
+    #[test]
+    fn visemes_and_quarters_of_lips_meet_arkit_shapes() {
+        let arkit = Resolver::new(ARKIT);
+        for (viseme, shapes) in VISEMES {
+            assert!(shapes.iter().all(|(name, share)| ARKIT.contains(name) && (0.0..=1.0).contains(share)));
+            assert_eq!(arkit.resolve(viseme).len(), shapes.len(), "{viseme}");
+        }
+        let spoken = Resolver::new(VISEMES.map(|(name, _)| name));
+        assert_eq!(resolved(&spoken, "jawOpen"), [("viseme_aa".to_owned(), 1.0)]);
+        assert!(spoken.resolve("eyeBlinkLeft").is_empty());
+        let quarters = ["UL", "UR", "DL", "DR"].map(|q| format!("CTRL_expressions_mouthFunnel{q}"));
+        let human = Resolver::new(quarters.iter().map(String::as_str));
+        assert_eq!(human.resolve("mouthFunnel").len(), 4);
+        assert!(Resolver::new(["CTRL_expressions_mouthFunnelUL"]).resolve("mouthFunnel").is_empty());
+        let halves = Resolver::new(["Mouth_Roll_In_Upper_L", "Mouth_Roll_In_Upper_R"]);
+        assert_eq!(halves.resolve("mouthRollUpper").len(), 2);
+        let vroid =
+            Resolver::new(["Face_Fcl_ALL_Joy", "Face_Fcl_MTH_A", "Face_Fcl_MTH_U", "Face_Fcl_BRW_Sorrow"]);
+        assert_eq!(resolved(&vroid, "jawOpen"), [("Face_Fcl_MTH_A".to_owned(), 1.0)]);
+        assert_eq!(resolved(&vroid, "happy"), [("Face_Fcl_ALL_Joy".to_owned(), 1.0)]);
+        assert_eq!(resolved(&vroid, "mouthPucker"), [("Face_Fcl_MTH_U".to_owned(), 1.0)]);
+        assert_eq!(resolved(&vroid, "browInnerUp"), [("Face_Fcl_BRW_Sorrow".to_owned(), 1.0)]);
     }
 
     #[test]

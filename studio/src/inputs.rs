@@ -29,31 +29,42 @@ pub struct LoadedHead {
     pub animation: Option<Sequence>,
     /// Source file and fingerprint.
     pub source: InputFile,
+    /// Where its parts were in the file, and what belongs to the head of a whole figure.
+    pub extent: import::gltf::Extent,
     /// What the reader left out, guessed or repaired.
     pub notes: Vec<Note>,
 }
 
-/// The head of a file (`.glb`, `.gltf`), or the built-in one.
+/// The head of a file (`.glb`, `.gltf`, `.vrm`, `.obj`, `.usda`, `.usdz`), or the built-in one.
 ///
 /// # Errors
 /// A file that is missing or that is no head.
 pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
+    let mut loaded = head_of_any_size(path)?;
+    let about = path.unwrap_or(Path::new("built-in head")).display().to_string();
+    loaded.notes.extend(check::head::size(&loaded.head).map(|f| {
+        let fix = f.fix.map(|fix| format!("; {fix}")).unwrap_or_default();
+        Note::new(about.as_str(), f.message + &fix)
+    }));
+    Ok(loaded)
+}
+
+/// As [`head`], without a word about its size.
+///
+/// # Errors
+/// As [`head`].
+pub fn head_of_any_size(path: Option<&Path>) -> Outcome<LoadedHead> {
     let name = path.unwrap_or(Path::new("built-in head"));
     let bytes = match path {
         None => std::borrow::Cow::Borrowed(DEFAULT_HEAD),
         Some(path) => {
-            require_file(path, "a head (.glb or .gltf)")?;
+            require_file(path, "a head (.glb, .gltf, .vrm, .obj, .usda or .usdz)")?;
             std::fs::read(path).map_err(|e| Failure::read(path, e))?.into()
         }
     };
-    let imported = import::gltf::from_bytes(&bytes, name)?;
+    let imported = import::file::from_bytes(&bytes, name)?;
     let about = name.display().to_string();
-    let mut notes: Vec<Note> =
-        imported.notes.iter().map(|n| Note::new(about.as_str(), n.to_string())).collect();
-    notes.extend(check::head::size(&imported.head).map(|f| {
-        let fix = f.fix.map(|fix| format!("; {fix}")).unwrap_or_default();
-        Note::new(about.as_str(), f.message + &fix)
-    }));
+    let notes: Vec<Note> = imported.notes.iter().map(|n| Note::new(about.as_str(), n.to_string())).collect();
     let rig = match imported.rig {
         None => None,
         Some(value) => {
@@ -73,6 +84,7 @@ pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
         rig,
         sequence,
         animation: imported.animation,
+        extent: imported.extent,
         source: InputFile { file: path.map(absolute).transpose()?, fingerprint: Fingerprint::of(&bytes) },
         notes,
     })
@@ -154,7 +166,8 @@ pub fn character(
     let skin = synthesize::Options { resolution: CHARACTER_MAPS, ..character.skin() };
     synthesize::synthesize_into_with(&mut head, &skin, step).map_err(Failure::input)?;
     let source = InputFile { file: None, fingerprint: Fingerprint::of(character.name.as_bytes()) };
-    Ok(LoadedHead { head, rig: None, sequence: None, animation: None, source, notes: Vec::new() })
+    let extent = import::gltf::Extent::default();
+    Ok(LoadedHead { head, rig: None, sequence: None, animation: None, extent, source, notes: Vec::new() })
 }
 
 /// Side of the maps of a character, texels.

@@ -6,6 +6,7 @@ use rubor_rig::head::{Head, Material};
 use rubor_rig::names::{ARKIT, Key, Resolver, canonical, is_known_shape, nearest, vocabulary};
 
 use super::{Finding, list};
+use crate::convert::size::{self, Guess};
 
 /// Heights of heads with and without a neck and shoulders, metres.
 const HEIGHTS_METRES: std::ops::RangeInclusive<f32> = 0.1..=0.8;
@@ -39,17 +40,22 @@ pub fn size(head: &Head) -> Option<Finding> {
     if height <= 0.0 || HEIGHTS_METRES.contains(&height) {
         return None;
     }
-    let unit = [("centimetres", 0.01), ("millimetres", 0.001), ("inches", 0.0254)]
-        .into_iter()
-        .find(|(_, metres)| HEIGHTS_METRES.contains(&(height * metres)));
     let message = format!(
         "the head is {height:.3} m high, where {} to {} m are likely: scattering would be far too sharp or soft",
         HEIGHTS_METRES.start(),
         HEIGHTS_METRES.end()
     );
-    let fix = match unit {
-        Some((unit, factor)) => format!("it looks like {unit}: scale the mesh by {factor} before import"),
-        None => "scale the mesh to metres before import".into(),
+    let fix = match size::guess(head, false) {
+        Some(Guess { unit: Some(unit), .. }) => {
+            format!("it looks like {unit}: `rubor import` makes metres of them")
+        }
+        Some(guess) => {
+            format!("`rubor import` makes it {:.2} m, or `--height METRES`", height * guess.factor)
+        }
+        None if size::is_figure(head, false) => {
+            "it looks like a whole figure: `rubor import --crop-head` keeps its head".into()
+        }
+        None => "`rubor import --height METRES` scales it".into(),
     };
     Some(Finding::warning("mesh", message).fix(fix))
 }

@@ -8,17 +8,21 @@
 //! another head    --transfer------> its distributions on this head's own blood
 //! strain of shapes --prediction---> distributions of a head that has none
 //! rest mesh       --occlusion-----> ambient visibility of each point
+//! a whole figure  --crop----------> its head, chosen parts
+//! lengths         --size----------> metres, with a guess of the unit
 //! all of these    --into_head-----> the maps of a head, with their provenance
 //! ```
 
 mod bvh;
 pub mod chromophores;
+pub mod crop;
 pub mod displacement;
 pub mod hemoglobin;
 pub mod into_head;
 pub mod normals;
 pub mod occlusion;
 pub mod prediction;
+pub mod size;
 pub mod skin_texels;
 pub mod surface_warp;
 pub mod transfer;

@@ -42,6 +42,8 @@ pub enum GroupBy {
 pub struct ObjFile {
     /// All points in the order of the file, used or not.
     pub mesh: PolyMesh,
+    /// Files of materials that it names.
+    pub libraries: Vec<String>,
     /// Notes on everything that was left out, guessed or repaired.
     pub notes: Vec<Note>,
 }
@@ -186,6 +188,7 @@ struct Reader<'a> {
     /// Of each corner: no `vt`.
     without_uv: Vec<bool>,
     faces_without_uv: usize,
+    libraries: Vec<String>,
     names: HashMap<String, u32>,
     groups: Vec<String>,
     group: Option<u32>,
@@ -208,6 +211,7 @@ impl<'a> Reader<'a> {
             uv_count: 0,
             without_uv: Vec::new(),
             faces_without_uv: 0,
+            libraries: Vec::new(),
             names: HashMap::new(),
             groups: Vec::new(),
             group: None,
@@ -247,8 +251,14 @@ impl<'a> Reader<'a> {
             b"l" | b"p" => {
                 self.notes.add("lines and points are no surface and are left out", format!("line {line}"))
             }
-            // Normals follow from the surface; smoothing groups and materials of files are not used.
-            b"vn" | b"s" | b"mtllib" => {}
+            b"mtllib" => {
+                let name = String::from_utf8_lossy(rest).into_owned();
+                if !name.is_empty() && !self.libraries.contains(&name) {
+                    self.libraries.push(name);
+                }
+            }
+            // Normals follow from the surface; smoothing groups are not used.
+            b"vn" | b"s" => {}
             other => {
                 let word = String::from_utf8_lossy(other).into_owned();
                 self.notes.add("statements that are not read", format!("{word:?} in line {line}"));
@@ -348,7 +358,7 @@ impl<'a> Reader<'a> {
 
     fn finish(mut self, group_by: GroupBy) -> Result<ObjFile, ImportError> {
         if self.point_count == 0 {
-            return Ok(ObjFile { mesh: PolyMesh::default(), notes: self.notes.into_vec() });
+            return Ok(ObjFile { notes: self.notes.into_vec(), ..ObjFile::default() });
         }
         let read = self.read_by_tobj()?;
         let vec3 = |p: &[f32]| Vec3::new(p[0], p[1], p[2]);
@@ -417,7 +427,7 @@ impl<'a> Reader<'a> {
                 place,
             );
         }
-        Ok(ObjFile { mesh, notes: self.notes.into_vec() })
+        Ok(ObjFile { mesh, libraries: self.libraries, notes: self.notes.into_vec() })
     }
 
     /// Corners of the first face.

@@ -22,6 +22,7 @@ use rubor_rig::landmarks::paired;
 
 use super::eye_projection::EyeProjection;
 use super::materials::guess_material;
+use super::mtl::Library;
 use super::obj::{self, GroupBy, ObjFile};
 use super::obj_match::{Match, compare};
 use super::tiles;
@@ -95,6 +96,18 @@ impl Units {
     }
 }
 
+impl std::fmt::Display for Units {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Millimetres => "millimetres",
+            Self::Centimetres => "centimetres",
+            Self::Decimetres => "decimetres",
+            Self::Metres => "metres",
+            Self::Inches => "inches",
+        })
+    }
+}
+
 impl std::str::FromStr for Units {
     type Err = String;
 
@@ -149,14 +162,14 @@ pub fn read(options: &Options) -> Result<ImportedSet, ImportError> {
             notes.add(&note.message, place);
         }
     };
-    let ObjFile { mut mesh, notes: of_neutral } = obj::read(&neutral, GroupBy::Material)?;
+    let ObjFile { mut mesh, libraries, notes: of_neutral } = obj::read(&neutral, GroupBy::Material)?;
     said(&mut notes, &neutral, &of_neutral);
     let scale = options.units.metres();
     mesh.points.iter_mut().for_each(|p| *p *= scale);
 
     let shape_files: Vec<&PathBuf> = files.iter().filter(|f| **f != neutral).collect();
     let read_shape = |path: &&PathBuf| -> Result<(Shape, Match, Vec<Note>), ImportError> {
-        let ObjFile { mesh: shape, notes } = obj::read_points(path, GroupBy::Material)?;
+        let ObjFile { mesh: shape, notes, .. } = obj::read_points(path, GroupBy::Material)?;
         if shape.points.len() != mesh.points.len() {
             let found = shape.points.len().to_string();
             let expected = format!("{} as in {}", mesh.points.len(), neutral.display());
@@ -222,6 +235,7 @@ pub fn read(options: &Options) -> Result<ImportedSet, ImportError> {
     let (mut head, _) = build_head(&mesh, &shapes, &parts, OFFSET_THRESHOLD * height);
     head.name = folder.file_name().map_or_else(|| file_stem(&neutral), |n| n.to_string_lossy().into_owned());
     head.landmarks = landmarks(folder, &mesh, &eyes)?;
+    Library::read(folder, &libraries, &mut notes).give(&mut head, &mut notes);
     let source = format!("{} and {} shapes, OBJ", file_name(&neutral), shapes.len());
     for of in ["geometry", "shapes"] {
         head.provenance.push(Provenance {

@@ -60,6 +60,10 @@ pub struct Prim {
     pub line: usize,
     /// By name; `.timeSamples` and `.connect` belong to the name.
     pub properties: BTreeMap<String, Value>,
+    /// What stands in brackets behind its name.
+    pub metadata: BTreeMap<String, Value>,
+    /// What stands in brackets behind a property, by the name of the property.
+    pub details: BTreeMap<String, BTreeMap<String, Value>>,
 }
 
 /// A layer, prims in the order of the text.
@@ -91,10 +95,7 @@ pub fn parse(bytes: &[u8]) -> Result<Layer, UsdaError> {
         return fail("a binary USD layer", "a text layer: convert it with `usdcat -o head.usda`");
     }
     if bytes.starts_with(b"PK") {
-        return fail(
-            "a packed USD (.usdz)",
-            "a text layer: unpack it and convert it with `usdcat -o head.usda`",
-        );
+        return fail("a packed USD (.usdz)", "a text layer: give the package a name that ends in .usdz");
     }
     let Ok(text) = std::str::from_utf8(bytes) else { return fail("bytes that are not UTF-8", "text") };
     if !text.starts_with("#usda 1.0") {
@@ -336,7 +337,7 @@ impl Reader<'_> {
         let Some(name) = self.string()? else { return self.fail("the name of a prim") };
         prim.path = format!("{parent}/{name}");
         if self.peek() == Some(b'(') {
-            self.metadata(&mut BTreeMap::new())?;
+            self.metadata(&mut prim.metadata)?;
         }
         self.expect(b'{', "the start of a prim")?;
         let (path, index) = (prim.path.clone(), prims.len());
@@ -361,7 +362,11 @@ impl Reader<'_> {
                     self.value(0)?;
                 }
                 _ => {
-                    let (name, value) = self.property(first)?;
+                    let mut details = BTreeMap::new();
+                    let (name, value) = self.property(first, &mut details)?;
+                    if !details.is_empty() {
+                        prims[index].details.insert(name.clone(), details);
+                    }
                     if let Some(value) = value {
                         prims[index].properties.insert(name, value);
                     }
@@ -400,7 +405,11 @@ impl Reader<'_> {
     }
 
     /// Type and qualifiers, name, and the value if there is one.
-    fn property(&mut self, first: String) -> Result<(String, Option<Value>), UsdaError> {
+    fn property(
+        &mut self,
+        first: String,
+        details: &mut BTreeMap<String, Value>,
+    ) -> Result<(String, Option<Value>), UsdaError> {
         let mut name = first;
         loop {
             if name.is_empty() {
@@ -429,7 +438,7 @@ impl Reader<'_> {
         }
         let value = if self.take(b'=') { Some(self.value(0)?) } else { None };
         if self.peek() == Some(b'(') {
-            self.metadata(&mut BTreeMap::new())?;
+            self.metadata(details)?;
         }
         Ok((name, value))
     }

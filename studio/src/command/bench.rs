@@ -14,7 +14,7 @@ use super::{console, print_json};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Head (.glb, .gltf) [default: the built-in head]
+    /// Head (.glb, .gltf, .vrm, .obj, .usda, .usdz) [default: the built-in head]
     #[arg(long, value_name = "FILE")]
     head: Option<PathBuf>,
     /// Sequence (.json) of which one frame is drawn [default: the demo, close enough for the head to fill the frame]

@@ -18,7 +18,7 @@ use rubor::{Failure, Outcome};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Heads (.glb, .gltf, .ma, .usda), rigs, sequences, retarget files (.json), recordings (.csv, .json); files that
+    /// Heads (.glb, .gltf, .vrm, .ma, .usda), rigs, sequences, retarget files (.json), recordings (.csv, .json); files that
     /// are given together is checked together
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
@@ -188,13 +188,13 @@ fn kind(file: &Path) -> Outcome<Kind> {
         return Err(Failure::input(format!("{}: found {found}, expected a file", file.display())));
     }
     match extension.as_str() {
-        "glb" | "gltf" => Ok(Kind::Gltf),
+        "glb" | "gltf" | "vrm" => Ok(Kind::Gltf),
         "ma" => Ok(Kind::Maya),
         "usda" | "usd" | "usdc" | "usdz" => Ok(Kind::Usd),
         "csv" => Ok(Kind::Capture),
         "json" => json_kind(file),
         _ => Err(Failure::input(format!(
-            "{}: found a name that ends in .{extension}, expected .glb, .gltf, .ma, .usda, .csv or .json",
+            "{}: found a name that ends in .{extension}, expected .glb, .gltf, .vrm, .ma, .usda, .csv or .json",
             file.display()
         ))),
     }

@@ -20,7 +20,7 @@ use super::{console, print_json};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// A head (.glb or .gltf) [default: the built-in head]
+    /// A head (.glb, .gltf, .vrm, .obj, .usda or .usdz) [default: the built-in head]
     #[arg(long, value_name = "FILE")]
     head: Option<PathBuf>,
     /// A rig (.json) [default: the head's own]
@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
     /// A sequence (.json) to animate [default: the one in the head, if it has one]
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
-    /// The file to write (.glb, or .usda with its pictures beside it)
+    /// The file to write (.glb, .usda with its pictures beside it, or .usdz with them inside)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Write no animation
@@ -87,9 +87,9 @@ fn parse_textures(text: &str) -> Result<TextureFormat, String> {
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let path = &arguments.output;
     let is = |extension: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    if !is("glb") && !is("usda") {
+    if !is("glb") && !is("usda") && !is("usdz") {
         return Err(Failure::input(format!(
-            "{}: expected a name that ends in .glb or .usda",
+            "{}: expected a name that ends in .glb, .usda or .usdz",
             path.display()
         )));
     }
@@ -122,7 +122,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             .collect();
         notes.push(format!("{} shapes are left out: {}", left.len(), left.join(", ")));
     }
-    if is("usda") {
+    if is("usda") || is("usdz") {
         if arguments.compress {
             return Err(Failure::input(
                 "--compress: USD has no such coding, expected a name that ends in .glb",
@@ -139,9 +139,14 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             tolerance: arguments.tolerance,
             ..usd::Options::default()
         };
-        let layer = usd::write(head, &options, path)?;
+        let layer = if is("usdz") {
+            usd::write_package(head, &options, path)?
+        } else {
+            usd::write(head, &options, path)?
+        };
+        let size = layer.package_size.unwrap_or(layer.text.len());
         notes.extend(layer.notes);
-        return report(arguments, path, head, kept, layer.keys, layer.text.len(), &notes);
+        return report(arguments, path, head, kept, layer.keys, size, &notes);
     }
     let options = gltf::Options {
         color_map_size: if arguments.small { 1024 } else { 2048 },

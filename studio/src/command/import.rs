@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use clap::{Subcommand, ValueEnum};
+use clap::Subcommand;
 use rubor_assets::export::gltf::MapEncodings;
 use rubor_assets::{export, import, synthesize};
 use rubor_rig::expression::Rig;
@@ -11,6 +11,7 @@ use rubor_rig::head::{Head, Material};
 use rubor_rig::timeline::Sequence;
 
 use super::console::{self, Progress};
+use super::fit::{Fit, Read};
 use super::scan_maps::ScanMaps;
 use rubor::Watch;
 use rubor::notes::Note;
@@ -22,12 +23,14 @@ use rubor::{Failure, Outcome};
 pub(crate) struct Arguments {
     #[command(subcommand)]
     from: Option<Source>,
-    /// Folder of OBJ files (a neutral and one for each shape), or a .glb or .gltf file
+    /// Folder of OBJ files (a neutral and one for each shape), or a file (.glb, .gltf, .vrm, .obj, .usda, .usdz)
     #[arg(required = true)]
     source: Option<PathBuf>,
-    /// Unit of length of OBJ files [default: cm]
-    #[arg(long, value_enum)]
-    units: Option<Units>,
+    /// Only meshes whose path contains this: names of node and mesh in glTF, the path in USD, the part in OBJ
+    #[arg(long, value_name = "PART")]
+    mesh: Option<String>,
+    #[command(flatten)]
+    fit: Fit,
     /// Also write the animation of a .glb or .gltf file (.json)
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
@@ -103,27 +106,6 @@ struct Makehuman {
     common: Common,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Units {
-    Mm,
-    Cm,
-    Dm,
-    M,
-    In,
-}
-
-impl From<Units> for import::obj_set::Units {
-    fn from(units: Units) -> Self {
-        match units {
-            Units::Mm => Self::Millimetres,
-            Units::Cm => Self::Centimetres,
-            Units::Dm => Self::Decimetres,
-            Units::M => Self::Metres,
-            Units::In => Self::Inches,
-        }
-    }
-}
-
 fn parse_target(text: &str) -> Result<(String, f32), String> {
     let wrong = || format!("found {text:?}, expected PATH=WEIGHT such as nose/nose-hump-incr=0.5");
     let (path, weight) = text.rsplit_once('=').ok_or_else(wrong)?;
@@ -168,14 +150,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         Some(Source::Capture(c)) => super::capture::run(c),
         None => {
             let Some(source) = &arguments.source else {
-                return Err(Failure::input("expected a folder of OBJ files, a .glb or a .gltf file"));
+                return Err(Failure::input("expected a folder of OBJ files, or a head as one file"));
             };
             if source.is_dir() && arguments.sequence.is_some() {
                 return Err(Failure::input("--sequence: a folder of OBJ files has no animation"));
-            }
-            if !source.is_dir() && arguments.units.is_some() {
-                return Err(Failure::input("--units: found a file, expected a folder of OBJ files")
-                    .hint("glTF is in metres: scale the mesh in the program that wrote it"));
             }
             if !source.is_dir() && arguments.common.subdivide.is_some() {
                 return Err(Failure::input("--subdivide: found a file, expected a folder of OBJ files"));
@@ -183,7 +161,6 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             let head = if source.is_dir() {
                 let mut options = import::obj_set::Options {
                     folder: source.clone(),
-                    units: arguments.units.unwrap_or(Units::Cm).into(),
                     ..import::obj_set::Options::default()
                 };
                 options.subdivide = arguments.common.subdivide.unwrap_or(options.subdivide);
@@ -192,10 +169,20 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
                 console::notes(
                     &set.notes.iter().map(|n| Note::new(&about, n.to_string())).collect::<Vec<_>>(),
                 );
-                set.head
+                let mut head = set.head;
+                let mut extent = import::gltf::Extent::default();
+                if let Some(mesh) = &arguments.mesh {
+                    Fit::choose(&mut head, &mut extent, mesh, source)?;
+                }
+                arguments.fit.apply(&mut head, &extent, Read::CENTIMETRES, source)?;
+                head
             } else {
-                let loaded = rubor::inputs::head(Some(source))?;
+                let mut loaded = rubor::inputs::head_of_any_size(Some(source))?;
                 console::notes(&loaded.notes);
+                if let Some(mesh) = &arguments.mesh {
+                    Fit::choose(&mut loaded.head, &mut loaded.extent, mesh, source)?;
+                }
+                arguments.fit.apply(&mut loaded.head, &loaded.extent, Read::METRES, source)?;
                 if let Some(path) = &arguments.sequence {
                     let found = loaded.sequence.as_ref().or(loaded.animation.as_ref());
                     write_sequence(found, source, path)?;

@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
+use rubor_assets::import::gltf::Extent;
 use rubor_maya::read;
 use rubor_maya::write::{self, Performance};
 use rubor_rig::expression::Rig;
 
+use super::fit::{Fit, Read};
 use super::import::{Common, finish_with};
 use rubor::notes::Note;
 use rubor::{Failure, Outcome};
@@ -40,12 +42,14 @@ struct Import {
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
     #[command(flatten)]
+    fit: Fit,
+    #[command(flatten)]
     common: Common,
 }
 
 #[derive(clap::Args)]
 struct Export {
-    /// A head (.glb or .gltf) [default: the built-in head]
+    /// A head (.glb, .gltf, .vrm, .obj, .usda or .usdz) [default: the built-in head]
     #[arg(long, value_name = "FILE")]
     head: Option<PathBuf>,
     /// A rig (.json) [default: the head's own]
@@ -75,9 +79,11 @@ fn require_extension(path: &Path, extension: &str) -> Outcome {
 
 fn import(arguments: &Import) -> Outcome {
     let options = read::Options { mesh: arguments.mesh.clone() };
-    let imported = read::read(&arguments.scene, &options)?;
+    let mut imported = read::read(&arguments.scene, &options)?;
     let about = arguments.scene.display().to_string();
     console::notes(&imported.notes.iter().map(|note| Note::new(&about, note)).collect::<Vec<_>>());
+    // The reader makes metres of the scene's own unit.
+    arguments.fit.apply(&mut imported.head, &Extent::default(), Read::METRES, &arguments.scene)?;
     if let Some(path) = &arguments.sequence {
         require_extension(path, "json")?;
         let Some(sequence) = &imported.sequence else {

@@ -19,6 +19,7 @@ mod compare;
 mod demo;
 mod export;
 mod filter;
+mod fit;
 mod gallery;
 mod import;
 mod kernel;
@@ -50,7 +51,7 @@ enum Command {
     Gallery(gallery::Arguments),
     /// Make a head from other files
     Import(import::Arguments),
-    /// Write an animated head for other programs: .glb, .usda
+    /// Write an animated head for other programs: .glb, .usda, .usdz
     Export(export::Arguments),
     /// Tell what is wrong with files, what has no effect, and why a wrinkle does not show
     Check(check::Arguments),

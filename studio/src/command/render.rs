@@ -14,7 +14,7 @@ use super::settings_flags::{One, SettingsFlags};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Head (.glb, .gltf); repeat for several side by side [default: the built-in head]
+    /// Head (.glb, .gltf, .vrm, .obj, .usda, .usdz); repeat for several side by side [default: the built-in head]
     #[arg(long, value_name = "FILE")]
     head: Vec<PathBuf>,
     /// Rig (.json) [default: the one in the head, else the six basic expressions for ARKit names]

@@ -1,4 +1,5 @@
-//! A head as `.usda`: UsdSkel blend shapes with in-betweens, a performance, plain materials with pictures beside it.
+//! A head as `.usda`: UsdSkel blend shapes with in-betweens, a performance, plain materials with pictures beside it; or as
+//! `.usdz`, a package of all of these.
 //!
 //! ```text
 //! /rubor_head (SkelRoot)      head motion as xformOps; rig and sequence as text in customData
@@ -33,6 +34,7 @@ use super::curves::kept_frames;
 use super::performance::Performance;
 use super::{TextureFormat, write_whole};
 use crate::error::ExportError;
+use crate::usdz;
 
 /// Contents of the file besides the head.
 #[derive(Clone, Debug)]
@@ -84,6 +86,29 @@ pub struct Layer {
     pub notes: Vec<String>,
     /// Frames with weights.
     pub keys: usize,
+    /// Bytes of the package, where it was written as one.
+    pub package_size: Option<usize>,
+}
+
+/// Writes a package: the layer and its pictures in one `.usdz`, under a temporary name first.
+///
+/// # Errors
+/// As [`to_layer`], a package of 4 GiB or more, and if the file cannot be written.
+pub fn write_package(head: &Head, options: &Options<'_>, path: &Path) -> Result<Layer, ExportError> {
+    let stem: String = path.file_stem().map(|s| identifier(&s.to_string_lossy())).unwrap_or_default();
+    let mut layer = to_layer(head, options, &stem)?;
+    let name = format!("{stem}.usda");
+    let pictures = layer.files.iter().map(|(name, bytes)| (name.as_str(), &bytes[..]));
+    let files: Vec<(&str, &[u8])> =
+        std::iter::once((name.as_str(), layer.text.as_bytes())).chain(pictures).collect();
+    let package = usdz::write(&files).ok_or_else(|| ExportError::Content {
+        at: path.display().to_string(),
+        found: "4 GiB or more".into(),
+        expected: "what a package can hold: fewer shapes or smaller pictures".into(),
+    })?;
+    write_whole(path, &package)?;
+    layer.package_size = Some(package.len());
+    Ok(layer)
 }
 
 /// Writes the layer and the pictures beside it, each under a temporary name first, the layer last.

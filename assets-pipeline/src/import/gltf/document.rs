@@ -15,6 +15,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf_json::validation::{Checked, Error, Validate};
 use serde_json::Value;
 
+use super::compressed;
 use crate::error::ImportError;
 use crate::facial_appearance::NAME;
 use crate::notes::Notes;
@@ -32,7 +33,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 const MOST_NUMBERS: usize = 1 << 27;
 
 /// Extensions that do not change the data read here, or change only how a number is stored.
-const UNDERSTOOD: [&str; 8] = [
+const UNDERSTOOD: [&str; 7] = [
     NAME,
     "KHR_mesh_quantization",
     "KHR_texture_transform",
@@ -40,7 +41,6 @@ const UNDERSTOOD: [&str; 8] = [
     "KHR_lights_punctual",
     "KHR_animation_pointer",
     "EXT_texture_webp",
-    "MSFT_texture_dds",
 ];
 /// The same for all extensions of these families: materials, VRM's avatars, metadata.
 const UNDERSTOOD_FAMILIES: [&str; 4] = ["KHR_materials_", "VRM", "KHR_xmp", "ADOBE_materials_"];
@@ -63,8 +63,29 @@ impl Document {
             ImportError::content(path, "document", e.to_string(), "a valid glTF 2.0 document")
         };
         let raw: Value = serde_json::from_slice(&text).map_err(invalid)?;
-        let mut json: gltf_json::Root = serde_json::from_value(readable(&raw, notes)).map_err(invalid)?;
-        check_extensions(&json, path)?;
+        let mut buffers = Vec::new();
+        for (i, buffer) in raw["buffers"].as_array().into_iter().flatten().enumerate() {
+            let at = format!("buffer {i}");
+            let is_fallback = compressed::is_fallback(buffer);
+            let data = match buffer["uri"].as_str() {
+                Some(uri) if is_fallback => resolve(path, &at, uri).unwrap_or_default(),
+                Some(uri) => resolve(path, &at, uri)?,
+                None if is_fallback => Vec::new(),
+                None => blob
+                    .take()
+                    .ok_or_else(|| ImportError::content(path, &at, "no binary chunk", "a binary chunk"))?,
+            };
+            let stated = buffer["byteLength"].as_u64().unwrap_or(0);
+            if (data.len() as u64) < stated && !is_fallback {
+                let found = format!("{} bytes", data.len());
+                return Err(ImportError::content(path, at, found, format!("{stated} bytes")));
+            }
+            buffers.push(data);
+        }
+        let mut plain = readable(&raw, notes);
+        check_required(&raw, path)?;
+        compressed::expand(&mut plain, &mut buffers, path, notes)?;
+        let mut json: gltf_json::Root = serde_json::from_value(plain).map_err(invalid)?;
         json.extensions_required.clear();
         for name in json.extensions_used.iter().filter(|n| !is_understood(n)) {
             notes.add("extensions that the file uses are not read", name);
@@ -73,24 +94,7 @@ impl Document {
         check_indices(&json, path, notes)?;
         let gltf = gltf::Document::from_json_without_validation(json);
         let numbers_left = Cell::new(MOST_NUMBERS);
-        let mut document = Self { gltf, raw, buffers: Vec::new(), path: path.to_owned(), numbers_left };
-        let mut buffers = Vec::new();
-        for buffer in document.gltf.buffers() {
-            let at = format!("buffer {}", buffer.index());
-            let data = match buffer.source() {
-                gltf::buffer::Source::Bin => {
-                    blob.take().ok_or_else(|| document.fail(&at, "no binary chunk", "a binary chunk"))?
-                }
-                gltf::buffer::Source::Uri(uri) => document.resolve(&at, uri)?,
-            };
-            if data.len() < buffer.length() {
-                let found = format!("{} bytes", data.len());
-                return Err(document.fail(&at, found, format!("{} bytes", buffer.length())));
-            }
-            buffers.push(data);
-        }
-        document.buffers = buffers;
-        Ok(document)
+        Ok(Self { gltf, raw, buffers, path: path.to_owned(), numbers_left })
     }
 
     /// Takes numbers from what all accessors may hold.
@@ -141,49 +145,40 @@ impl Document {
                 Some(view) => self.view(&at, &view).map(Cow::Borrowed),
                 None => Err(self.fail(&at, format!("view {}", view.value()), "an existing view")),
             },
-            (None, Some(uri)) => self.resolve(&at, uri).map(Cow::Owned),
+            (None, Some(uri)) => resolve(&self.path, &at, uri).map(Cow::Owned),
             (None, None) => Err(self.fail(&at, "neither view nor URI", "one of them")),
         }
     }
+}
 
-    /// Bytes behind a URI: data, or a file in the document's folder or below.
-    fn resolve(&self, at: &str, uri: &str) -> Result<Vec<u8>, ImportError> {
-        if let Some(data) = uri.strip_prefix("data:") {
-            let Some((_, encoded)) = data.split_once(";base64,") else {
-                return Err(self.fail(at, "a data URI that is not base64", "base64 data"));
-            };
-            return BASE64
-                .decode(encoded)
-                .map_err(|e| self.fail(at, format!("broken base64 ({e})"), "base64 data"));
-        }
-        let decoded = percent_encoding::percent_decode_str(uri).decode_utf8().ok();
-        let relative = decoded.as_deref().filter(|p| {
-            !uri.contains(':')
-                && !p.contains('\\')
-                && Path::new(p).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
-        });
-        let Some(relative) = relative else {
-            return Err(self.fail(
-                at,
-                format!("URI {uri:?}"),
-                "a file in the folder of the document or below",
-            ));
+/// Bytes behind a URI: data, or a file in the folder of the document or below.
+fn resolve(path: &Path, at: &str, uri: &str) -> Result<Vec<u8>, ImportError> {
+    let fail = |found: String, expected: &str| Err(ImportError::content(path, at, found, expected));
+    if let Some(data) = uri.strip_prefix("data:") {
+        let Some((_, encoded)) = data.split_once(";base64,") else {
+            return fail("a data URI that is not base64".into(), "base64 data");
         };
-        let folder = self.path.parent().unwrap_or(Path::new(""));
-        let file = folder.join(relative);
-        // A link may lead out of the folder: compare its target.
-        let real = fs::canonicalize(&file).map_err(ImportError::read(&file))?;
-        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let real_folder = fs::canonicalize(folder).map_err(ImportError::read(folder))?;
-        if !real.starts_with(real_folder) {
-            return Err(self.fail(
-                at,
-                format!("URI {uri:?}"),
-                "a file in the folder of the document or below",
-            ));
-        }
-        fs::read(&real).map_err(ImportError::read(&file))
+        return BASE64.decode(encoded).or_else(|e| fail(format!("broken base64 ({e})"), "base64 data"));
     }
+    let decoded = percent_encoding::percent_decode_str(uri).decode_utf8().ok();
+    let relative = decoded.as_deref().filter(|p| {
+        !uri.contains(':')
+            && !p.contains('\\')
+            && Path::new(p).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir))
+    });
+    let Some(relative) = relative else {
+        return fail(format!("URI {uri:?}"), "a file in the folder of the document or below");
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let file = folder.join(relative);
+    // A link may lead out of the folder: compare its target.
+    let real = fs::canonicalize(&file).map_err(ImportError::read(&file))?;
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let real_folder = fs::canonicalize(folder).map_err(ImportError::read(folder))?;
+    if !real.starts_with(real_folder) {
+        return fail(format!("URI {uri:?}"), "a file in the folder of the document or below");
+    }
+    fs::read(&real).map_err(ImportError::read(&file))
 }
 
 /// JSON, and the binary chunk if there is one.
@@ -258,26 +253,20 @@ fn is_attribute(name: &str) -> bool {
 }
 
 fn is_understood(extension: &str) -> bool {
-    UNDERSTOOD.contains(&extension) || UNDERSTOOD_FAMILIES.iter().any(|family| extension.starts_with(family))
+    UNDERSTOOD.contains(&extension)
+        || compressed::READ.contains(&extension)
+        || UNDERSTOOD_FAMILIES.iter().any(|family| extension.starts_with(family))
 }
 
-/// What a file requires must be understood; compressed geometry is refused in words.
-fn check_extensions(json: &gltf_json::Root, path: &Path) -> Result<(), ImportError> {
-    for (i, name) in json.extensions_required.iter().enumerate() {
-        if is_understood(name) {
-            continue;
+/// What a file requires must be understood.
+fn check_required(raw: &Value, path: &Path) -> Result<(), ImportError> {
+    for (i, name) in raw["extensionsRequired"].as_array().into_iter().flatten().enumerate() {
+        let name = name.as_str().unwrap_or_default();
+        if !is_understood(name) {
+            let found = format!("the required extension {name:?}");
+            let expected = "an extension that rubor understands: export the file without it";
+            return Err(ImportError::content(path, format!("extensionsRequired {i}"), found, expected));
         }
-        let expected = match name.as_str() {
-            "KHR_draco_mesh_compression" => {
-                "geometry without Draco compression: export it so, or decompress it with `gltf-transform copy`"
-            }
-            "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-                "buffers without meshopt compression: export them so, or decompress them with `gltf-transform copy`"
-            }
-            _ => "an extension that rubor understands",
-        };
-        let found = format!("the required extension {name:?}");
-        return Err(ImportError::content(path, format!("extensionsRequired {i}"), found, expected));
     }
     Ok(())
 }

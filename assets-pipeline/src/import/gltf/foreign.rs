@@ -8,8 +8,10 @@ use gltf::mesh::Mode;
 use gltf::{Mesh, Node, Primitive, Semantic};
 use rubor_rig::head::{BlendShape, Head, Material, Part, Vertex};
 
+use super::Extent;
 use super::accessor;
 use super::document::Document;
+use super::head_joints::HeadJoints;
 use super::materials::Materials;
 use super::motion::{Driver, Motion};
 use super::placement::Placement;
@@ -18,6 +20,23 @@ use super::weld::{Corner, weld};
 use crate::error::ImportError;
 use crate::import::materials::recognise;
 use crate::notes::Notes;
+
+/// A mesh that a node shows.
+pub(super) struct Instance {
+    pub(super) node: Option<usize>,
+    pub(super) mesh: usize,
+    /// Shape of each morph target.
+    pub(super) slots: Vec<u32>,
+}
+
+/// A head, and what the file says of it besides.
+pub(super) struct Foreign {
+    pub(super) head: Head,
+    /// Names of shapes and what moves them, in order.
+    pub(super) shapes: Vec<(String, Driver)>,
+    pub(super) instances: Vec<Instance>,
+    pub(super) extent: Extent,
+}
 
 struct Builder<'a> {
     document: &'a Document,
@@ -34,23 +53,36 @@ struct Builder<'a> {
     unnamed: Vec<bool>,
     /// Of each part: it has no material.
     bare: Vec<bool>,
+    instances: Vec<Instance>,
+    extent: Extent,
+    joints: HeadJoints,
 }
 
 /// A tree of nodes is not deeper than this.
 const MOST_LEVELS: usize = 512;
 
 /// The head, and what moves each of its shapes.
-pub(super) fn read(
-    document: &Document,
-    motion: &Motion,
-    notes: &mut Notes,
-) -> Result<(Head, Vec<(String, Driver)>), ImportError> {
+pub(super) fn read(document: &Document, motion: &Motion, notes: &mut Notes) -> Result<Foreign, ImportError> {
     let shapes = Shapes::new(document, notes);
     let (head, corners, world) = (Head::default(), Vec::new(), HashMap::new());
     let materials = Materials::new(document);
-    let (unnamed, bare) = (Vec::new(), Vec::new());
-    let mut builder =
-        Builder { document, motion, notes, materials, head, shapes, corners, world, unnamed, bare };
+    let (unnamed, bare, instances) = (Vec::new(), Vec::new(), Vec::new());
+    let (extent, joints) = (Extent::default(), HeadJoints::of(document));
+    let mut builder = Builder {
+        document,
+        motion,
+        notes,
+        materials,
+        head,
+        shapes,
+        corners,
+        world,
+        unnamed,
+        bare,
+        instances,
+        extent,
+        joints,
+    };
     let scene = document.gltf.default_scene().or_else(|| document.gltf.scenes().next());
     match scene {
         Some(scene) => {
@@ -73,14 +105,17 @@ pub(super) fn read(
             }
         }
     }
-    let (mut head, shapes) = builder.finish();
+    let Foreign { mut head, shapes, instances, mut extent } = builder.finish();
+    if !extent.head_share.iter().any(|share| *share > 0.0) {
+        extent.head_share.clear();
+    }
     if head.mesh.triangles.is_empty() {
         return Err(document.fail("scene", "no triangles", "a mesh"));
     }
     if head.name.is_empty() {
         head.name = document.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     }
-    Ok((head, shapes))
+    Ok(Foreign { head, shapes, instances, extent })
 }
 
 impl Builder<'_> {
@@ -122,6 +157,7 @@ impl Builder<'_> {
     ) -> Result<(), ImportError> {
         let document = self.document;
         let slots = self.shapes.of_instance(document, mesh, node, self.motion, self.notes);
+        self.instances.push(Instance { node, mesh: mesh.index(), slots: slots.clone() });
         for (i, primitive) in mesh.primitives().enumerate() {
             let at = |what: &str| format!("mesh {}, primitive {i}, {what}", mesh.index());
             let positions = primitive
@@ -140,7 +176,7 @@ impl Builder<'_> {
                 None => vec![[0.0; 3]; count],
             };
             check("NORMAL", normals.len())?;
-            let uvs = match primitive.get(&Semantic::TexCoords(0)) {
+            let mut uvs = match primitive.get(&Semantic::TexCoords(0)) {
                 Some(a) => accessor::floats::<2>(document, &at("TEXCOORD_0"), &a)?,
                 None => {
                     self.notes.add("parts without texture coordinates have them all at 0", at("TEXCOORD_0"));
@@ -153,6 +189,9 @@ impl Builder<'_> {
                 None => vec![[0.0; 2]; count],
             };
             check("TEXCOORD_1", second_uvs.len())?;
+            if let Some(a) = primitive.get(&Semantic::TexCoords(0)).filter(|a| !is_plain(a)) {
+                self.spread(&primitive, &mut uvs, &at(&format!("TEXCOORD_0, {:?}", a.data_type())));
+            }
             let colors = colors(document, &at("COLOR_0"), &primitive, count)?;
             check("COLOR_0", colors.len())?;
             let mut targets: Vec<(u32, Vec<[f32; 3]>)> = Vec::new();
@@ -214,12 +253,33 @@ impl Builder<'_> {
                 authored.second_uvs.push(Vec2::from_array(second_uvs[v]));
                 authored.colors_linear.push(colors[v]);
             }
+            let shares = self.joints.shares(document, &at(""), node, &primitive, count)?;
+            self.extent.head_share.extend(shares);
+            self.extent.meshes.push(path(mesh, node, document));
             let start = self.head.mesh.triangles.len() as u32;
             self.head.mesh.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
             let end = self.head.mesh.triangles.len() as u32;
             self.part(mesh, node, &primitive, start..end);
         }
         Ok(())
+    }
+
+    /// Whole numbers as texture coordinates need a transform to be 0 to 1. Where all textures of the material have the
+    /// same one it moves from the textures to the vertices, so that every map of the part has the same coordinates.
+    fn spread(&mut self, primitive: &Primitive<'_>, uvs: &mut [[f32; 2]], at: &str) {
+        let material = self.materials.read(primitive.material().index(), self.notes);
+        match self.materials.take_transform(material) {
+            Some(transform) => {
+                let matrix = transform.matrix();
+                for uv in uvs {
+                    *uv = matrix.transform_point2(Vec2::from_array(*uv)).to_array();
+                }
+            }
+            None => {
+                let message = "texture coordinates are whole numbers and the textures do not say one scale for them: maps of rubor's own repeat there";
+                self.notes.add(message, at);
+            }
+        }
     }
 
     /// A part: what names say it is, and the material of its author.
@@ -282,7 +342,7 @@ impl Builder<'_> {
     }
 
     /// Points from vertices, offsets of shapes by point.
-    fn finish(mut self) -> (Head, Vec<(String, Driver)>) {
+    fn finish(mut self) -> Foreign {
         self.name_rest();
         let (mut head, shapes) = (self.head, self.shapes.finish());
         head.authored = self.materials.authored;
@@ -302,8 +362,20 @@ impl Builder<'_> {
                 shape.offsets.push(*offset);
             }
         }
-        (head, shapes)
+        Foreign { head, shapes, instances: self.instances, extent: self.extent }
     }
+}
+
+/// Whether texture coordinates are floats or normalized.
+fn is_plain(accessor: &gltf::Accessor<'_>) -> bool {
+    accessor.normalized() || accessor.data_type() == gltf::accessor::DataType::F32
+}
+
+/// Names of node and mesh, to choose parts by.
+fn path(mesh: &Mesh<'_>, node: Option<usize>, document: &Document) -> String {
+    let node = node.and_then(|n| document.gltf.nodes().nth(n));
+    let name = |name: Option<&str>| name.unwrap_or_default().to_owned();
+    format!("{}|{}", name(node.as_ref().and_then(Node::name)), name(mesh.name()))
 }
 
 /// Factors of the base colour of each vertex.

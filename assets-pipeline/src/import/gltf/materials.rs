@@ -5,18 +5,17 @@
 use std::collections::HashMap;
 
 use glam::Vec2;
-use rubor_rig::authored::{
-    AlphaMode, Authored, AuthoredImage, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap,
-};
+use rubor_rig::authored::{AlphaMode, Authored, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap};
 use serde_json::Value;
 
 use super::document::Document;
+use crate::import::picture;
 use crate::notes::Notes;
 
 /// Extensions of materials whose whole effect is read.
 const READ: [&str; 2] = ["KHR_materials_unlit", "KHR_materials_emissive_strength"];
 /// Extensions of textures that say where the picture is, in the order in which they are preferred to `source`.
-const SOURCES: [&str; 1] = ["EXT_texture_webp"];
+const SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 
 /// Reads each material and picture once.
 pub(super) struct Materials<'a> {
@@ -26,11 +25,19 @@ pub(super) struct Materials<'a> {
     materials: HashMap<Option<usize>, u32>,
     /// Pictures by index in the document; none where one cannot be read.
     images: HashMap<usize, Option<u32>>,
+    /// Transforms that moved from the textures of a material to its vertices.
+    taken: HashMap<u32, Option<TextureTransform>>,
 }
 
 impl<'a> Materials<'a> {
     pub(super) fn new(document: &'a Document) -> Self {
-        Self { document, authored: Authored::default(), materials: HashMap::new(), images: HashMap::new() }
+        Self {
+            document,
+            authored: Authored::default(),
+            materials: HashMap::new(),
+            images: HashMap::new(),
+            taken: HashMap::new(),
+        }
     }
 
     /// The material of a primitive; without one it is the default of glTF 2.0.
@@ -45,6 +52,33 @@ impl<'a> Materials<'a> {
         self.authored.materials.push(material);
         self.materials.insert(index, known);
         known
+    }
+
+    /// The transform that all textures of a material share for the first set of texture coordinates; they keep none. A
+    /// material is asked once for each primitive that shows it, so the answer is remembered.
+    pub(super) fn take_transform(&mut self, material: u32) -> Option<TextureTransform> {
+        if let Some(known) = self.taken.get(&material) {
+            return *known;
+        }
+        let material_of = &mut self.authored.materials[material as usize];
+        let first: Vec<TextureTransform> = (material_of.textures().iter())
+            .filter_map(|(_, texture)| texture.filter(|t| t.uv_set == 0).map(|t| t.transform))
+            .collect();
+        let shared = first.first().copied().filter(|t| first.iter().all(|other| other == t));
+        if shared.is_some() {
+            let textures = [
+                &mut material_of.base_color_texture,
+                &mut material_of.metallic_roughness_texture,
+                &mut material_of.normal_texture,
+                &mut material_of.occlusion_texture,
+                &mut material_of.emission_texture,
+            ];
+            for texture in textures.into_iter().flatten().filter(|t| t.uv_set == 0) {
+                texture.transform = TextureTransform::default();
+            }
+        }
+        self.taken.insert(material, shared);
+        shared
     }
 
     fn material(&mut self, raw: &Value, at: &str, notes: &mut Notes) -> AuthoredMaterial {
@@ -106,7 +140,8 @@ impl<'a> Materials<'a> {
             return None;
         };
         let extended = SOURCES.iter().find_map(|name| index(&texture["extensions"][*name]["source"]));
-        let Some(source) = extended.or_else(|| index(&texture["source"])) else {
+        let plain = index(&texture["source"]);
+        let Some(source) = extended.or(plain) else {
             let names =
                 texture["extensions"].as_object().into_iter().flatten().map(|(name, _)| name.as_str());
             let names: Vec<&str> = names.collect();
@@ -117,7 +152,14 @@ impl<'a> Materials<'a> {
             notes.add(message, at);
             return None;
         };
-        let image = self.image(source, at, notes)?;
+        let image = match (self.image(source, at, notes), plain) {
+            (Some(image), _) => image,
+            (None, Some(plain)) if plain != source => {
+                notes.add("textures are read from their plain copy", at);
+                self.image(plain, at, notes)?
+            }
+            (None, _) => return None,
+        };
         let moved = &info["extensions"]["KHR_texture_transform"];
         let set = index(&moved["texCoord"]).or_else(|| index(&info["texCoord"])).unwrap_or(0);
         let Some(uv_set) = u32::try_from(set).ok().filter(|set| *set <= 1) else {
@@ -159,13 +201,8 @@ impl<'a> Materials<'a> {
         }
         let read = u32::try_from(source).map_err(|e| e.to_string()).and_then(|source| {
             let bytes = self.document.image(source).map_err(|e| e.to_string())?;
-            let picture = image::load_from_memory(&bytes).map_err(|e| e.to_string())?.into_rgba8();
-            let (width, height) = picture.dimensions();
-            if width == 0 || height == 0 {
-                return Err(format!("{width} x {height} texels"));
-            }
             let name = self.document.raw["images"][source as usize]["name"].as_str().unwrap_or_default();
-            Ok(AuthoredImage { name: name.to_owned(), width, height, rgba: picture.into_raw() })
+            picture::decode(&bytes, name)
         });
         let known = match read {
             Ok(image) => {

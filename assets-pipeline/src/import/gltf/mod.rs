@@ -1,7 +1,7 @@
 //! Heads from glTF 2.0 files: those that rubor wrote, and foreign ones with morph targets.
 //!
 //! ```text
-//! .glb or .gltf + buffers --document--> accessors --> primitives of every mesh node
+//! .glb, .gltf, .vrm + buffers --document, decompressed--> accessors --> primitives of every mesh node
 //!   own file (RUBOR_facial_appearance): points, parts, maps as stored
 //!   foreign file: node transforms applied, shapes united where names and weights agree, points welded by distance and
 //!                 angle, parts recognised by names; all others keep the material of their author
@@ -12,8 +12,10 @@
 
 mod accessor;
 mod channels;
+mod compressed;
 mod document;
 mod foreign;
+mod head_joints;
 mod lint;
 mod materials;
 mod motion;
@@ -22,6 +24,7 @@ mod own;
 mod placement;
 mod recovered;
 mod shapes;
+mod vrm;
 mod weld;
 
 use std::fs;
@@ -49,11 +52,22 @@ pub struct ImportedHead {
     /// Its first animation that moves the head, as tracks that other programs keyed. Default weights of meshes and
     /// nodes are constant tracks, also without an animation.
     pub animation: Option<Sequence>,
+    /// Where in the file its parts were, and what belongs to a head of a whole figure.
+    pub extent: Extent,
     /// Notes on everything that was left out, guessed or repaired.
     pub notes: Vec<Note>,
 }
 
-/// Reads a `.glb` or `.gltf`. Buffers and images may be in the file, in data URIs, or in files of the same folder or
+/// What a file says about parts and vertices of a head, to choose from them. Empty for heads that rubor wrote.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Extent {
+    /// Names of node and mesh of each part, `node|mesh`.
+    pub meshes: Vec<String>,
+    /// How much each vertex follows the joints of head and neck, 0 to 1; empty where the file has no such joints.
+    pub head_share: Vec<f32>,
+}
+
+/// Reads a `.glb`, `.gltf` or `.vrm`. Buffers and images may be in the file, in data URIs, or in files of the same folder or
 /// below; other places are refused.
 ///
 /// # Errors
@@ -76,8 +90,12 @@ pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError
     let (mut imported, shapes) = match &extension {
         Some(extension) => own::read(&document, extension, &motion, &mut notes)?,
         None => {
-            let (head, shapes) = foreign::read(&document, &motion, &mut notes)?;
-            (ImportedHead { head, ..ImportedHead::default() }, shapes)
+            let read = foreign::read(&document, &motion, &mut notes)?;
+            let mut head = read.head;
+            let rig = vrm::rig(&document, &read.instances, &head, &mut notes);
+            vrm::turn(&document, &mut head, &mut notes);
+            let rig = rig.and_then(|rig| serde_json::to_value(rig).ok());
+            (ImportedHead { head, rig, extent: read.extent, ..ImportedHead::default() }, read.shapes)
         }
     };
     imported.head.validate()?;

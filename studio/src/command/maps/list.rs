@@ -18,14 +18,14 @@ use rubor::{inputs, output};
 /// Arguments of `rubor maps list`.
 #[derive(Debug, Args)]
 pub(crate) struct ListArgs {
-    /// Head (.glb, .gltf) [default: the built-in head]
+    /// Head (.glb, .gltf, .vrm, .obj, .usda, .usdz) [default: the built-in head]
     head: Option<PathBuf>,
 }
 
 /// Arguments of `rubor maps extract`.
 #[derive(Debug, Args)]
 pub(crate) struct ExtractArgs {
-    /// Head (.glb, .gltf) [default: the built-in head]
+    /// Head (.glb, .gltf, .vrm, .obj, .usda, .usdz) [default: the built-in head]
     head: Option<PathBuf>,
     /// Folder for the images (.exr)
     #[arg(short, long)]
