@@ -186,8 +186,8 @@ fn shapes_carry_the_colour_of_their_expression() {
         numbers("min").max(numbers("max"))
     };
     let (few, all, none) = (largest(0), largest(1), largest(2));
-    // Steps of 1/127, each rounded.
-    assert!(few > 1.0 && (all - 0.5 * few).abs() <= 0.75 && none == 0.0, "{few} {all} {none}");
+    // Steps of 1/32767, each rounded.
+    assert!(few > 300.0 && (all - 0.5 * few).abs() <= 0.75 && none == 0.0, "{few} {all} {none}");
     assert_eq!(from_bytes(&bytes, Path::new("colored.glb")).unwrap().head.shapes, head.shapes);
 }
 

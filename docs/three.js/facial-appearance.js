@@ -41,7 +41,13 @@ export class FacialAppearance {
     if (this.maps.slopes) await this.loadRelief(images);
     await this.loadAnimation(gltf, data.skinAnimation);
     images.dispose();
-    for (const mesh of this.skins) mesh.material = this.material(mesh.material);
+    for (const mesh of this.skins) {
+      // Colours of vertices and shapes stand in for the extension in programs that do not know it.
+      mesh.geometry.deleteAttribute("color");
+      delete mesh.geometry.morphAttributes.color;
+      mesh.geometry.dispose();
+      mesh.material = this.material(mesh.material);
+    }
     this.setWeights({});
   }
 

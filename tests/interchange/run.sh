@@ -61,6 +61,7 @@ web() {
   for pose in neutral joy anger surprise blush pallor; do
     "$here/pose.sh" "$rubor" "$out" "$pose" || failed=1
   done
+  node "$here/viewer.mjs" "$out/compressed.glb" "$out" || failed=1
   # Programs that do not know the extension.
   npx --no-install gltf-transform copy "$out/demo.glb" "$out/copied.glb" || failed=1
   "$rubor" check "$out/copied.glb" || failed=1

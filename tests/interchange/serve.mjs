@@ -23,9 +23,10 @@ export async function withBrowser(head, work) {
   const server = createServer((request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, "http://x").pathname));
     if (path === "/favicon.ico") return response.writeHead(204).end();
-    const roots = { "/node_modules/": process.cwd(), "/three.js/": join(here, "../../docs") };
-    const root = Object.keys(roots).find((prefix) => path.startsWith(prefix));
-    const file = path === "/head.glb" ? head : join(root ? roots[root] : here, path);
+    // The viewer's own folder gets its packages from here.
+    const packages = /(^|\/three\.js)(\/node_modules\/.*)/.exec(path)?.[2];
+    const file = path === "/head.glb" ? head : packages ? join(process.cwd(), packages)
+      : join(path.startsWith("/three.js/") ? join(here, "../../docs") : here, path);
     if (!existsSync(file) || !statSync(file).isFile()) return response.writeHead(404).end();
     response.writeHead(200, { "content-type": types[extname(file)] ?? "application/octet-stream" });
     response.end(readFileSync(file));
@@ -43,7 +44,7 @@ export async function withBrowser(head, work) {
       page.on("console", (m) => m.type() === "error" && faults.push(`${file}: ${m.text()}`));
       page.setDefaultTimeout(300000);
       await page.goto(`http://127.0.0.1:${server.address().port}/${file}`);
-      await page.waitForFunction("window.ready !== undefined");
+      await page.waitForFunction("window.ready !== undefined || window.viewer !== undefined");
       return page;
     });
   } finally {

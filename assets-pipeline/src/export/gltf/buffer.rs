@@ -39,10 +39,10 @@ pub(super) enum Precision {
 pub(super) const POSITION: Precision = Precision::PowerOfTwo(-18);
 /// Displacements of shapes: 7.6 micrometres; a pixel of a portrait at 2160 rows is about 120.
 pub(super) const DISPLACEMENT: Precision = Precision::PowerOfTwo(-17);
-/// Changes of normals, at most a ninth of a degree off.
-pub(super) const NORMAL_CHANGE: Precision = Precision::PowerOfTwo(-8);
-/// Changes of colours: at most half a step of 8 bits off.
-pub(super) const COLOR_CHANGE: Precision = Precision::PowerOfTwo(-8);
+/// Changes of normals, at most an eighteenth of a degree off.
+pub(super) const NORMAL_CHANGE: Precision = Precision::PowerOfTwo(-9);
+/// Changes of colours: at most a quarter of a step of 8 bits off, as a dozen of them are added.
+pub(super) const COLOR_CHANGE: Precision = Precision::PowerOfTwo(-9);
 /// Colours.
 pub(super) const COLOR: Precision = Precision::PowerOfTwo(-10);
 /// Texture coordinates: a sixteenth of a texel of 2048.
@@ -52,7 +52,7 @@ pub(super) const WEIGHT: Precision = Precision::PowerOfTwo(-17);
 
 /// Unit vectors of a compressed file: bits of an octahedron's axes.
 const NORMAL_BITS: u32 = 12;
-const TANGENT_BITS: u32 = 8;
+const TANGENT_BITS: u32 = 10;
 
 /// Grows the buffer and the lists of views, accessors and images.
 #[derive(Default)]
@@ -182,7 +182,7 @@ impl Buffer {
         }
         let view = self.coded_view(meshopt::directions(values, TANGENT_BITS), Target::Vertices);
         self.accessor(json!({
-            "bufferView": view, "componentType": BYTE, "normalized": true, "count": values.len(), "type": "VEC4",
+            "bufferView": view, "componentType": SHORT, "normalized": true, "count": values.len(), "type": "VEC4",
         }))
     }
 
@@ -273,35 +273,35 @@ impl Buffer {
         Some(self.accessor(accessor))
     }
 
-    /// Changes of colour of some of `count` vertices, -1 to 1: sparse where that is smaller, in steps of 1/127 of a plain
-    /// file. `None` when nothing changes.
+    /// Changes of colour of some of `count` vertices, -1 to 1: sparse where that is smaller, in steps of 1/32767 of a
+    /// plain file. `None` when nothing changes.
     pub(super) fn color_changes(&mut self, count: usize, changed: &[(u32, Vec3)]) -> Option<usize> {
         if self.is_compressed {
             return self.displacements(count, changed, COLOR_CHANGE);
         }
-        let step = |c: f32| (c.clamp(-1.0, 1.0) * 127.0).round() as i8;
-        let kept: Vec<(u32, [i8; 3])> =
+        let step = |c: f32| (c.clamp(-1.0, 1.0) * 32767.0).round() as i16;
+        let kept: Vec<(u32, [i16; 3])> =
             changed.iter().map(|(i, c)| (*i, c.to_array().map(step))).filter(|(_, c)| *c != [0; 3]).collect();
         if kept.is_empty() {
             return None;
         }
         // Elements of vertices begin at multiples of 4 bytes; those of sparse values need not.
-        if kept.len() * 5 >= count * 4 {
-            let mut values = vec![[0_i8; 4]; count];
+        if kept.len() == count {
+            let mut values = vec![[0_i16; 4]; count];
             kept.iter().for_each(|(i, [r, g, b])| values[*i as usize] = [*r, *g, *b, 0]);
             let view = self.view(bytemuck::cast_slice(values.as_flattened()), Target::Vertices);
-            self.views[view]["byteStride"] = json!(4);
+            self.views[view]["byteStride"] = json!(8);
             let mut accessor = json!({
-                "bufferView": view, "componentType": BYTE, "normalized": true, "count": count, "type": "VEC3",
+                "bufferView": view, "componentType": SHORT, "normalized": true, "count": count, "type": "VEC3",
             });
             set_bounds(&mut accessor, values.iter().map(|[r, g, b, _]| [r, g, b].map(|c| f32::from(*c))));
             return Some(self.accessor(accessor));
         }
         let indices: Vec<u32> = kept.iter().map(|(i, _)| *i).collect();
-        let values: Vec<[i8; 3]> = kept.iter().map(|(_, c)| *c).collect();
+        let values: Vec<[i16; 3]> = kept.iter().map(|(_, c)| *c).collect();
         let (index_view, component) = self.index_view(&indices, count, Target::None);
         let value_view = self.view(bytemuck::cast_slice(values.as_flattened()), Target::None);
-        let mut accessor = sparse(BYTE, count, kept.len(), (index_view, component), value_view);
+        let mut accessor = sparse(SHORT, count, kept.len(), (index_view, component), value_view);
         accessor["normalized"] = json!(true);
         set_bounds(&mut accessor, values.iter().map(|c| c.map(f32::from)).chain([[0.0; 3]]));
         Some(self.accessor(accessor))
