@@ -14,6 +14,13 @@ pub const NAME: &str = "RUBOR_facial_appearance";
 /// Version written and read here.
 pub const VERSION: u32 = 1;
 
+/// In the copy of the extension in the extras of the mesh: names of images by their index in the extension.
+pub(crate) const IMAGE_NAMES: &str = "imageNames";
+/// Names of accessors by their index in the extension.
+pub(crate) const ACCESSOR_NAMES: &str = "accessorNames";
+/// Fields that are indices of accessors of the head's geometry.
+pub(crate) const ACCESSOR_FIELDS: [&str; 2] = ["points", "changes"];
+
 /// Root object of the extension.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -40,6 +47,12 @@ pub struct FacialAppearance {
     /// Maps of the skin.
     #[serde(default)]
     pub maps: MapEntries,
+    /// The colour of skin of any melanin and hemoglobin, for programs that have no model of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin_look_up: Option<SkinLookUpEntry>,
+    /// What the sequence does to the skin, frame by frame, for programs that evaluate no rig.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin_animation: Option<SkinAnimationEntry>,
     /// Where geometry and maps come from.
     #[serde(default)]
     pub provenance: Vec<Provenance>,
@@ -49,6 +62,48 @@ pub struct FacialAppearance {
     /// The sequence file that the animation was made from, as it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequence: Option<serde_json::Value>,
+}
+
+/// A picture of skin, sRGB without alpha: melanin along a row, hemoglobin down. The texel at the place
+/// `(cbrt(melanin / mostMelanin), cbrt(hemoglobin / mostHemoglobin))`, from the middle of the first texel to that of the last,
+/// is the diffuse reflectance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct SkinLookUpEntry {
+    /// glTF image.
+    pub image: u32,
+    /// Volume fraction at the right edge.
+    pub most_melanin: f32,
+    /// Volume fraction at the lower edge.
+    pub most_hemoglobin: f32,
+}
+
+/// Weights at times; all accessors are SCALAR floats, lists frame after frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct SkinAnimationEntry {
+    /// Accessor: seconds, rising.
+    pub times: u32,
+    /// Names of the rig's expressions.
+    pub expressions: Vec<String>,
+    /// Accessor: their weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expression_weights: Option<u32>,
+    /// Names of the rig's states.
+    pub states: Vec<String>,
+    /// Accessor: their weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state_weights: Option<u32>,
+    /// Accessor: weights of `maps.zones`, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zone_weights: Option<u32>,
+    /// Accessor: weights of `maps.distributions`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distribution_weights: Option<u32>,
+    /// Accessor: factor of all hemoglobin.
+    pub hemoglobin_scales: u32,
+    /// Accessor: diameter of the pupils, millimetres.
+    pub pupils_mm: u32,
 }
 
 /// A part of the mesh.

@@ -401,6 +401,11 @@ fn the_published_schema_names_the_properties() {
         "version": 1, "name": "n", "mesh": 0, "pointCount": 3, "parts": [part], "occlusion": 2,
         "shapeOcclusion": [{"shape": "jawOpen", "points": 3, "changes": 4}],
         "landmarks": {"a": [0.0, 0.0, 0.0]}, "maps": maps, "provenance": [provenance], "rig": {}, "sequence": {},
+        "skinLookUp": {"image": 0, "mostMelanin": 0.5, "mostHemoglobin": 0.32},
+        "skinAnimation": {
+            "times": 5, "expressions": ["joy"], "expressionWeights": 6, "states": ["blush"], "stateWeights": 7,
+            "zoneWeights": 8, "distributionWeights": 9, "hemoglobinScales": 10, "pupilsMm": 11,
+        },
     });
     let written = |v: Value| -> Value {
         let parsed: FacialAppearance = serde_json::from_value(v).unwrap();
@@ -418,6 +423,8 @@ fn the_published_schema_names_the_properties() {
     );
     assert_eq!(keys(&back["maps"]["melanin"]), keys(at("/$defs/map/properties")));
     assert_eq!(keys(&back["provenance"][0]), keys(at("/properties/provenance/items/properties")));
+    assert_eq!(keys(&back["skinLookUp"]), keys(at("/properties/skinLookUp/properties")));
+    assert_eq!(keys(&back["skinAnimation"]), keys(at("/properties/skinAnimation/properties")));
     let materials: Vec<Value> =
         rubor_rig::head::Material::ALL.iter().map(|m| serde_json::to_value(m).unwrap()).collect();
     assert_eq!(&Value::Array(materials), at("/properties/parts/items/properties/material/enum"));

@@ -13,7 +13,7 @@
 
 use glam::{EulerRot, Quat, Vec3};
 
-use crate::bind::{Binder, BoundRig, Limits};
+use crate::bind::{Binder, BoundRig, Limits, Weights};
 use crate::error::{Note, RigError};
 use crate::expression::Rig;
 use crate::face_state::FaceState;
@@ -233,8 +233,8 @@ impl Evaluator {
         }
     }
 
-    /// The face alone at a time in seconds.
-    pub fn face_at(&self, time_s: f64) -> FaceState {
+    /// Weights of expressions and states as their tracks have them at a time in seconds; those of shapes are 0.
+    pub fn weights_at(&self, time_s: f64) -> Weights {
         let mut weights = self.rig.neutral_weights();
         for (index, track) in &self.expressions {
             weights.expressions[*index] = track.at(time_s);
@@ -242,6 +242,12 @@ impl Evaluator {
         for (index, track) in &self.states {
             weights.states[*index] = track.at(time_s);
         }
+        weights
+    }
+
+    /// The face alone at a time in seconds.
+    pub fn face_at(&self, time_s: f64) -> FaceState {
+        let mut weights = self.weights_at(time_s);
         // A single track is used unclamped; a sum of tracks is clamped to the widest range among them.
         let mut limits = vec![Limits::default(); weights.shapes.len()];
         for (targets, track) in &self.shapes {

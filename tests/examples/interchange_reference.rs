@@ -10,6 +10,7 @@ use rubor_assets::import;
 use rubor_rig::deform::deform_points;
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::expression::Rig;
+use rubor_rig::head::Head;
 use rubor_rig::timeline::Sequence;
 
 /// Sampled times.
@@ -55,9 +56,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(folder.join("points.bin"), points)?;
     let json = serde_json::json!({
         "heightMetres": head.height(), "fps": sequence.fps, "times": times, "weights": weights,
+        "pictureTime": picture_time_s(&head, &evaluator, &times),
         "names": head.shapes.iter().map(|s| &s.name).collect::<Vec<_>>(),
         "vertices": head.mesh.vertices.len(), "points": head.mesh.points.len(),
     });
     std::fs::write(folder.join("reference.json"), serde_json::to_vec(&json)?)?;
     Ok(())
+}
+
+/// Of these times, that at which the lids are widest open.
+fn picture_time_s(head: &Head, evaluator: &Evaluator, times: &[f64]) -> f64 {
+    let lids: Vec<usize> =
+        ["eyeBlinkLeft", "eyeBlinkRight"].iter().filter_map(|name| head.shape_index(name)).collect();
+    let closed = |t: f64| {
+        let face = evaluator.face_at(t);
+        lids.iter().map(|lid| face.shapes[*lid]).sum::<f32>()
+    };
+    times.iter().copied().min_by(|a, b| closed(*a).total_cmp(&closed(*b))).unwrap_or_default()
 }

@@ -1,44 +1,82 @@
 #!/bin/sh
-# Compares exports with other programs: validator, three.js, Babylon.js, Blender, OpenUSD. Not part of `make test`, as it
-# downloads them. What is missing is said and left out.
+# Compares exports with other programs: validator, three.js, Babylon.js, glTF Transform, Blender, OpenUSD. Not part of
+# `make test`, as it downloads them.
 #
-#   tests/interchange/run.sh [FOLDER]     FOLDER (out/interchange) gets exports, references and pictures
+#   tests/interchange/run.sh [FOLDER [STEP..]]   FOLDER (out/interchange) gets exports, references and pictures
 #
-# BPY_PYTHON and USD_PYTHON: pythons with the packages bpy and usd-core; made in FOLDER where they are not set.
+# Steps: web (npm, a Chromium), blender (package bpy), usd (package usd-core). Without steps all that can be had here run, and
+# what is missing is said. A step that is named fails where something is missing.
+#
+# CHROMIUM: the browser. BPY_PYTHON, USD_PYTHON: pythons with the packages; made in FOLDER where they are not set.
+# RUBOR_ADAPTER: the adapter that draws the pictures of rubor.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 out=${1:-$here/../../out/interchange}
+[ $# -gt 0 ] && shift
+asked=$*
 mkdir -p "$out/node"
 out=$(cd "$out" && pwd)
 cd "$here/../.."
-cargo build --release --locked -p rubor -p rubor-tests --bins --examples
-rubor=${CARGO_TARGET_DIR:-target}/release/rubor
-reference=${CARGO_TARGET_DIR:-target}/release/examples/interchange_reference
 status=0
+
+# wanted STEP: whether to do it. missing STEP WHAT: a failure where the step was asked for by name.
+wanted() { case " ${asked:-$1} " in *" $1 "*) return 0 ;; esac; return 1; }
+missing() {
+  if [ -n "$asked" ]; then echo "FAILED: $2" >&2; status=1; else echo "SKIPPED: $2"; fi
+}
+
+cargo build --release --locked -p rubor -p rubor-tests --bins --examples
+target=$(cd "${CARGO_TARGET_DIR:-target}" && pwd)
+rubor=$target/release/rubor
+examples=$target/release/examples
 
 for name in mixed combined; do
   "$rubor" export --rig "$here/$name.rig.json" --sequence "$here/$name.json" -o "$out/$name.glb"
   "$rubor" export --rig "$here/$name.rig.json" --sequence "$here/$name.json" --linear -o "$out/$name-linear.glb"
 done
-"$rubor" export --sequence rig/src/demo_sequence.json --linear -o "$out/demo-linear.glb"
-"$rubor" export --sequence rig/src/demo_sequence.json -o "$out/demo.glb"
-"$rubor" export --sequence rig/src/demo_sequence.json --textures webp --top-shapes 8 -o "$out/top.glb"
-"$rubor" export --sequence rig/src/demo_sequence.json --bake joy --textures png --small -o "$out/baked.glb"
+demo=rig/src/demo_sequence.json
+"$rubor" export --sequence $demo --linear -o "$out/demo-linear.glb"
+"$rubor" export --sequence $demo -o "$out/demo.glb"
+"$rubor" export --sequence $demo --compress -o "$out/compressed.glb"
+"$rubor" export --sequence $demo --textures webp --top-shapes 8 -o "$out/top.glb"
+"$rubor" export --sequence $demo --bake joy --textures png --small -o "$out/baked.glb"
 "$rubor" export --still -o "$out/still.glb"
-"$rubor" export --sequence rig/src/demo_sequence.json -o "$out/demo.usda"
+"$rubor" export --sequence $demo -o "$out/demo.usda"
 "$rubor" export --rig "$here/combined.rig.json" --sequence "$here/combined.json" -o "$out/combined.usda"
-for name in mixed combined demo top mixed-linear combined-linear demo-linear; do "$reference" "$out/$name.glb" "$out/$name"; done
-for name in combined demo; do "$reference" "$out/$name.glb" "$out/$name-frames" frames; done
+for name in mixed combined demo top mixed-linear combined-linear demo-linear; do
+  "$examples/interchange_reference" "$out/$name.glb" "$out/$name"
+done
+for name in combined demo; do "$examples/interchange_reference" "$out/$name.glb" "$out/$name-frames" frames; done
 
-if command -v npm >/dev/null; then
+web() {
   cp "$here/package.json" "$out/node/"
-  [ -d "$out/node/node_modules" ] || (cd "$out/node" && npm install --silent)
-  (cd "$out/node" && node "$here/validate.mjs" "$out"/*.glb) || status=1
-  for name in mixed combined demo top; do
-    (cd "$out/node" && node "$here/browser.mjs" "$out/$name.glb" "$out/$name") || status=1
+  (cd "$out/node" && npm install --silent --no-fund --no-audit) || return 1
+  cd "$out/node"
+  node "$here/validate.mjs" "$out"/mixed*.glb "$out"/combined*.glb "$out"/demo*.glb "$out/top.glb" "$out/baked.glb" "$out/still.glb" || failed=1
+  for name in mixed combined demo top; do node "$here/browser.mjs" "$out/$name.glb" "$out/$name" || failed=1; done
+  # A coded file has the vertices of the plain one in another order of bytes, within 4 and 8 micrometres.
+  node "$here/browser.mjs" "$out/compressed.glb" "$out/demo" 1e-4 three || failed=1
+  # Blood and wrinkles: docs/three.js beside rubor, one white lamp, no shadows, no scattering.
+  "$examples/interchange_shot" "$out/still.glb" "$here/white-light.json" "$out/shot.json" || return 1
+  for pose in neutral joy anger surprise blush pallor; do
+    "$here/pose.sh" "$rubor" "$out" "$pose" || failed=1
   done
-else
-  echo "SKIPPED: validator, three.js and Babylon.js need npm"
+  node "$here/viewer.mjs" "$out/compressed.glb" "$out" || failed=1
+  # Programs that do not know the extension.
+  npx --no-install gltf-transform copy "$out/demo.glb" "$out/copied.glb" || failed=1
+  "$rubor" check "$out/copied.glb" || failed=1
+  cd "$here/../.."
+  [ -z "${failed:-}" ]
+}
+if wanted web; then
+  if ! command -v npm >/dev/null; then missing web "validator, three.js and Babylon.js need npm"
+  elif ! chromium=${CHROMIUM:-$(command -v chromium || command -v chromium-browser || command -v google-chrome)}; then
+    missing web "three.js and Babylon.js need a Chromium (Debian: apt-get install chromium; or set CHROMIUM)"
+  else
+    CHROMIUM=$chromium
+    export CHROMIUM
+    web || status=1
+  fi
 fi
 
 python_with() { # package, variable's value
@@ -46,19 +84,23 @@ python_with() { # package, variable's value
   [ -x "$out/$1/bin/python" ] || { python3 -m venv "$out/$1" && "$out/$1/bin/pip" install -q "$1" numpy; } >&2 || return 0
   echo "$out/$1/bin/python"
 }
-bpy=$(python_with bpy "${BPY_PYTHON:-}")
 # Blender's importer drops the slopes of cubic keys, so it gets straight lines.
-if [ -n "$bpy" ] && "$bpy" -c "import bpy" 2>/dev/null; then
-  for name in mixed-linear combined-linear demo-linear; do
-    "$bpy" "$here/blender_compare.py" "$out/$name.glb" "$out/$name" --picture || status=1
-  done
-else
-  echo "SKIPPED: Blender (package bpy) cannot be had here"
+if wanted blender; then
+  bpy=$(python_with bpy "${BPY_PYTHON:-}")
+  if [ -n "$bpy" ] && "$bpy" -c "import bpy" 2>/dev/null; then
+    for name in mixed-linear combined-linear demo-linear; do
+      "$bpy" "$here/blender_compare.py" "$out/$name.glb" "$out/$name" --picture || status=1
+    done
+  else
+    missing blender "Blender (package bpy) cannot be had here"
+  fi
 fi
-usd=$(python_with usd-core "${USD_PYTHON:-}")
-if [ -n "$usd" ] && "$usd" -c "import pxr" 2>/dev/null; then
-  for name in combined demo; do "$usd" "$here/usd_compare.py" "$out/$name.usda" "$out/$name-frames" || status=1; done
-else
-  echo "SKIPPED: OpenUSD (package usd-core) cannot be had here"
+if wanted usd; then
+  usd=$(python_with usd-core "${USD_PYTHON:-}")
+  if [ -n "$usd" ] && "$usd" -c "import pxr" 2>/dev/null; then
+    for name in combined demo; do "$usd" "$here/usd_compare.py" "$out/$name.usda" "$out/$name-frames" || status=1; done
+  else
+    missing usd "OpenUSD (package usd-core) cannot be had here"
+  fi
 fi
 exit $status

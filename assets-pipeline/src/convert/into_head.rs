@@ -132,6 +132,22 @@ pub fn put_slopes(head: &mut Head, slopes: Map, origin: &Origin) -> Result<(), C
     Ok(())
 }
 
+/// Puts intensity and Beckmann roughness of reflection into a head.
+///
+/// # Errors
+/// Channels other than 2, values outside 0..1.
+pub fn put_specular(head: &mut Head, specular: Map, origin: &Origin) -> Result<(), ConvertError> {
+    if specular.channels != 2 {
+        return Err(ConvertError::argument("specular", format!("{} channels", specular.channels), "2"));
+    }
+    if let Some(v) = specular.values.iter().find(|v| !(0.0..=1.0).contains(*v)) {
+        return Err(ConvertError::argument("specular", v.to_string(), "values from 0 to 1"));
+    }
+    head.maps.specular = Some(specular);
+    origin.stamp(head, "specular");
+    Ok(())
+}
+
 /// Puts slopes of wrinkles into a head as its map `index` (a new one where it is their number), with zones that fade
 /// them in; zones of the same name are replaced.
 ///

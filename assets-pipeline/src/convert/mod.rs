@@ -4,6 +4,7 @@
 //! hemoglobin maps --hemoglobin----> neutral map, its mean, scale and bias of every expression
 //! albedo texture  --chromophores--> melanin and hemoglobin maps, residual, out-of-gamut mask
 //! normal map      --normals-------> slopes, difference maps, and back
+//! displacement    --displacement--> slopes of what it raises, alone or finer than a normal map
 //! another head    --transfer------> its distributions on this head's own blood
 //! strain of shapes --prediction---> distributions of a head that has none
 //! rest mesh       --occlusion-----> ambient visibility of each point
@@ -15,6 +16,7 @@
 mod bvh;
 pub mod chromophores;
 pub mod crop;
+pub mod displacement;
 pub mod hemoglobin;
 pub mod into_head;
 pub mod normals;

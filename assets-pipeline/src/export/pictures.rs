@@ -2,19 +2,22 @@
 
 use glam::Vec3;
 use image::ExtendedColorType;
+use rayon::prelude::*;
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::map::Map;
 
-use super::skin_color::{bake, bake_slopes};
-use crate::import::eye_projection::LIMBUS_UV;
+use super::eye_mouth;
+use super::skin_color::{bake, bake_slopes, hidden_by_hair};
+use crate::convert::skin_texels::SkinTexels;
 
-/// Side of the eye picture.
-const EYE_SIZE: u32 = 512;
 /// Size of the lash picture: along the lid, root to tip.
 const LASH_SIZE: (u32, u32) = (512, 64);
-/// Texture radius of the pupil in the projection of [`Material::Eye`].
-const PUPIL_UV: f32 = 0.035;
+/// Largest side of the pictures of gloss, which is smooth.
+const GLOSS_SIZE: u32 = 1024;
+
+/// Of skin (Jimenez 2012 section 7.6: 1.4).
+const SKIN_IOR: f32 = 1.4;
 
 /// 8-bit texels.
 pub(super) struct Picture {
@@ -29,8 +32,14 @@ pub(super) struct Pictures {
     pub(super) base_color: Option<Picture>,
     /// Tangent space, x to the right, y up.
     pub(super) normals: Option<Picture>,
-    /// sRGB.
+    /// Linear: red is ambient visibility, green perceptual roughness, blue 0.
+    pub(super) gloss: Option<Picture>,
+    /// Alpha is the strength of reflection; the colours are white.
+    pub(super) specular: Option<Picture>,
+    /// sRGB, of the front half of the eye (see [`eye_mouth::EYE_TRANSFORM`]).
     pub(super) eye: Option<Picture>,
+    /// sRGB; absent too where the teeth have other texture coordinates than rubor's (see [`eye_mouth::teeth`]).
+    pub(super) teeth: Option<Picture>,
     /// sRGB with straight alpha.
     pub(super) lashes: Option<Picture>,
 }
@@ -57,36 +66,86 @@ impl Pictures {
             normals: slopes
                 .filter(|_| normal_size > 0 && has(Material::Skin))
                 .map(|slopes| normal_map(slopes, normal_size)),
-            eye: has(Material::Eye).then(eye_picture),
+            gloss: gloss(head, color_size.min(GLOSS_SIZE)),
+            specular: specular(head, color_size.min(GLOSS_SIZE / 2)),
+            eye: has(Material::Eye).then(|| eye_mouth::eye(head.maps.hair_color_linear)),
+            teeth: eye_mouth::has_teeth_coordinates(head).then(eye_mouth::teeth),
             lashes: has(Material::Lash).then(lash_picture),
         }
     }
 }
 
-/// A material in two numbers.
+/// A material in numbers.
 pub(super) struct Look {
     /// Linear Rec. 709 and opacity.
     pub(super) color_linear: [f32; 4],
     /// Perceptual roughness.
     pub(super) roughness: f32,
+    /// Index of refraction.
+    pub(super) ior: f32,
+    /// Strength of reflection, 0 to 1.
+    pub(super) specular: f32,
 }
 
-/// `textured`: the skin has a picture.
-pub(super) fn appearance(material: Material, textured: bool) -> Look {
-    let (color_linear, roughness) = match material {
-        Material::Skin if textured => ([1.0; 4], 0.5),
-        Material::Skin => ([0.60, 0.36, 0.27, 1.0], 0.5),
-        Material::Mucosa => ([0.40, 0.10, 0.09, 1.0], 0.35),
-        Material::Gums => ([0.45, 0.14, 0.13, 1.0], 0.3),
-        Material::Teeth => ([0.78, 0.72, 0.60, 1.0], 0.2),
-        Material::Eye => ([1.0; 4], 0.1),
-        Material::Lash => ([1.0; 4], 0.7),
-        Material::Hair => ([0.05, 0.03, 0.02, 1.0], 0.6),
-        Material::Wet => ([1.0, 1.0, 1.0, 0.06], 0.05),
-        Material::Hidden => ([0.0; 4], 1.0),
-        Material::Other => ([0.5, 0.5, 0.5, 1.0], 0.8),
+/// `textured`: the part has a picture. Colours, reflection and roughness are those of the renderer, whose Beckmann
+/// roughness is about the square of the perceptual one.
+pub(super) fn appearance(head: &Head, material: Material, textured: bool) -> Look {
+    let white = [1.0; 4];
+    let solid = |[r, g, b]: [f32; 3]| [r, g, b, 1.0];
+    let hair = head.maps.hair_color_linear;
+    let (color_linear, roughness, ior, specular) = match material {
+        Material::Skin if textured => (white, 0.5, SKIN_IOR, 1.0),
+        Material::Skin => (solid([0.60, 0.36, 0.27]), 0.57, SKIN_IOR, 0.6),
+        Material::Mucosa => (solid([0.36, 0.105, 0.095]), 0.49, SKIN_IOR, 0.8),
+        Material::Gums => (solid([0.37, 0.13, 0.12]), 0.49, SKIN_IOR, 0.8),
+        Material::Teeth if textured => (white, 0.4, 1.62, 0.6),
+        Material::Teeth => (solid([0.66, 0.56, 0.42]), 0.4, 1.62, 0.6),
+        Material::Eye => (white, 0.25, 1.376, 1.0),
+        Material::Lash => (white, 0.7, 1.5, 0.5),
+        Material::Hair if hair != [0.0; 3] => (solid(hair), 0.6, 1.5, 0.5),
+        Material::Hair => (solid([0.05, 0.03, 0.02]), 0.6, 1.5, 0.5),
+        Material::Wet => ([1.0, 1.0, 1.0, 0.06], 0.05, 1.336, 1.0),
+        Material::Hidden => ([0.0; 4], 1.0, 1.5, 1.0),
+        Material::Other => (solid([0.2, 0.2, 0.2]), 0.7, 1.4, 0.3),
     };
-    Look { color_linear, roughness }
+    Look { color_linear, roughness, ior, specular }
+}
+
+/// Visibility and roughness of the skin; `None` where the head says nothing of either.
+fn gloss(head: &Head, size: u32) -> Option<Picture> {
+    let has_skin = head.mesh.parts.iter().any(|p| p.material == Material::Skin);
+    let open = &head.mesh.occlusion;
+    let map = head.maps.specular.as_ref();
+    if size == 0 || !has_skin || (open.is_empty() && map.is_none()) {
+        return None;
+    }
+    let open = (!open.is_empty()).then(|| SkinTexels::new(head, size, size).map_of_points(open));
+    let texel = |i: u32| {
+        let (u, v) = ((i % size) as f32 + 0.5, (i / size) as f32 + 0.5);
+        let (u, v) = (u / size as f32, v / size as f32);
+        let open = open.as_ref().map_or(1.0, |m| m.values[i as usize]);
+        let roughness = map.map_or(0.5, |m| m.sample(u, v, 1).max(0.0).sqrt());
+        [open, roughness, 0.0].map(byte)
+    };
+    let texels = (0..size * size).into_par_iter().flat_map_iter(texel).collect();
+    Some(Picture { texels, size: (size, size), color: ExtendedColorType::Rgb8 })
+}
+
+/// Strength of the skin's reflection, without what short hair hides.
+fn specular(head: &Head, size: u32) -> Option<Picture> {
+    let map = head.maps.specular.as_ref().filter(|_| size > 0)?;
+    let texel = |i: u32| {
+        let (u, v) = ((i % size) as f32 + 0.5, (i / size) as f32 + 0.5);
+        let (u, v) = (u / size as f32, v / size as f32);
+        let hair = head.maps.hair.as_ref().map_or(0.0, |h| hidden_by_hair(h.sample(u, v, 0)));
+        [255, 255, 255, byte(map.sample(u, v, 0) * (1.0 - hair))]
+    };
+    let texels = (0..size * size).into_par_iter().flat_map_iter(texel).collect();
+    Some(Picture { texels, size: (size, size), color: ExtendedColorType::Rgba8 })
+}
+
+fn byte(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
 /// Tangent space normals of a map of slopes; x to the right, y up, in 8 bits.
@@ -101,26 +160,6 @@ fn normal_map(slopes: &Map, size: u32) -> Picture {
         }
     }
     Picture { texels, size: (width, height), color: ExtendedColorType::Rgb8 }
-}
-
-/// Sclera, iris with radial fibres and dark rim, pupil; sRGB.
-fn eye_picture() -> Picture {
-    let mut texels = Vec::with_capacity((EYE_SIZE * EYE_SIZE * 3) as usize);
-    for y in 0..EYE_SIZE {
-        for x in 0..EYE_SIZE {
-            let (dx, dy) =
-                ((x as f32 + 0.5) / EYE_SIZE as f32 - 0.5, (y as f32 + 0.5) / EYE_SIZE as f32 - 0.5);
-            let (r, phi) = (dx.hypot(dy), dy.atan2(dx));
-            let soft = |edge: f32| ((r - edge) * EYE_SIZE as f32 / 1.5 + 0.5).clamp(0.0, 1.0);
-            let fibres = 0.85 + 0.15 * (phi * 37.0).sin() * (phi * 11.0 + 1.3).cos();
-            let rim = 1.0 - 0.6 * ((r - 0.065) / (LIMBUS_UV - 0.065)).clamp(0.0, 1.0);
-            let iris = Vec3::new(0.33, 0.24, 0.15) * fibres * rim;
-            let sclera = Vec3::new(0.90, 0.87, 0.84);
-            let color = (iris * soft(PUPIL_UV) + 0.02).lerp(sclera, soft(LIMBUS_UV));
-            texels.extend(color.to_array().map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8));
-        }
-    }
-    Picture { texels, size: (EYE_SIZE, EYE_SIZE), color: ExtendedColorType::Rgb8 }
 }
 
 /// Dark hairs that taper from root (top row) to tip; straight alpha.

@@ -36,6 +36,12 @@ fn table() -> SkinLookup {
     SkinModel::new(&ChromophoreModel::default()).bake(TABLE_SIDE, TABLE_SIDE)
 }
 
+/// How much of the skin hair of this cover hides, as the renderer has it.
+pub(super) fn hidden_by_hair(cover: f32) -> f32 {
+    let t = (cover / 0.85).clamp(0.0, 1.0);
+    0.97 * t * t * (3.0 - 2.0 * t)
+}
+
 /// The skin of a face (none: the neutral one) in sRGB, from the chromophore maps; at most `side` texels wide, times a
 /// factor. `None` for a head without these maps or without skin.
 pub fn bake(head: &Head, face: Option<&FaceState>, side: u32, factor: f32) -> Option<RgbImage> {
@@ -56,9 +62,10 @@ pub fn bake(head: &Head, face: Option<&FaceState>, side: u32, factor: f32) -> Op
             .flat_map(|x| {
                 let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
                 let skin = lookup.sample(melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));
-                let hair = maps.hair.as_ref().map_or(0.0, |h| h.sample(u, v, 0));
-                let rgb: [f32; 3] =
-                    std::array::from_fn(|c| skin[c] + hair * (maps.hair_color_linear[c] - skin[c]));
+                let hair = maps.hair.as_ref().map_or(0.0, |h| hidden_by_hair(h.sample(u, v, 0)));
+                let rgb: [f32; 3] = std::array::from_fn(|c| {
+                    (skin[c] + hair * (maps.hair_color_linear[c] - skin[c])) * (1.0 - 0.3 * hair)
+                });
                 rgb.map(|c| (srgb_encode((c * factor).min(1.0)) * 255.0).round() as u8)
             })
             .collect()

@@ -1,6 +1,8 @@
 //! Files that tests make for themselves.
 #![allow(dead_code, unreachable_pub, missing_docs)] // each test uses a part
 
+pub mod bumpy;
+
 use serde_json::{Value, json};
 
 pub fn base64(bytes: &[u8]) -> String {

@@ -101,6 +101,7 @@ pub fn to_scene(
             Some(json.map_err(|e| WriteError::Encode { what: "rig".into(), reason: e.to_string() })?);
     }
     scene.files = files;
+    scene.notes.extend(rubor_assets::export::authored_lost(head, "Maya"));
     let (animation, inbetweens) = animate(head, performance, &options.inbetweens, &mut scene.notes)?;
     let targets = mesh::Targets::new(head, inbetweens, &mut scene.notes);
     let fps = performance.map_or(24.0, |p| p.sequence.fps);

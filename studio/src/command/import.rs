@@ -12,6 +12,7 @@ use rubor_rig::timeline::Sequence;
 
 use super::console::{self, Progress};
 use super::fit::{Fit, Read};
+use super::scan_maps::ScanMaps;
 use rubor::Watch;
 use rubor::notes::Note;
 use rubor::{Failure, Outcome};
@@ -71,6 +72,8 @@ pub(crate) struct Common {
     /// Smaller file: maps as JPEG, no normals of shapes for other viewers
     #[arg(long)]
     small: bool,
+    #[command(flatten)]
+    scan: ScanMaps,
 }
 
 #[derive(clap::Args)]
@@ -258,6 +261,8 @@ pub(crate) fn finish_with(
         Note::new(path.display().to_string(), f.message + &fix)
     });
     console::notes(&layout.collect::<Vec<_>>());
+    let mut notes = Vec::new();
+    common.scan.put_color(&mut head, &mut notes)?;
     let has_skin = head.mesh.parts.iter().any(|p| p.material == Material::Skin);
     if !has_skin && common.maps > 0 {
         let message =
@@ -279,6 +284,8 @@ pub(crate) fn finish_with(
         let message = "no maps are made: --seed and --melanin have no effect";
         console::notes(&[Note::new(path.display().to_string(), message)]);
     }
+    common.scan.put_surface(&mut head, &mut notes)?;
+    console::notes(&notes);
     let options = export::gltf::Options {
         color_map_size: if common.small { 1024 } else { 2048 },
         rig: Some(rig),

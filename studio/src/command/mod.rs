@@ -27,6 +27,7 @@ mod maps;
 mod maya;
 mod profile;
 mod render;
+mod scan_maps;
 mod schema;
 mod settings_flags;
 

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::buffer::{Buffer, Target};
+use super::buffer::{Buffer, Precision, Target, WEIGHT};
 use crate::export::curves::{Curve, Interpolation};
 use crate::export::performance::PerformanceCurves;
 
@@ -11,13 +11,13 @@ pub(super) fn write(curves: &PerformanceCurves, buffer: &mut Buffer) -> Option<V
     let rests = |curve: &Curve, rest: &[f32]| curve.is_constant() && curve.keys[0].values == rest;
     let mut tracks: Vec<(&str, &Curve, usize)> = Vec::new();
     if !rests(&curves.rotation, &[0.0, 0.0, 0.0, 1.0]) {
-        tracks.push(("rotation", &curves.rotation, elements::<4>(&curves.rotation, buffer)));
+        tracks.push(("rotation", &curves.rotation, elements(&curves.rotation, 4, buffer)));
     }
     if !rests(&curves.translation, &[0.0; 3]) {
-        tracks.push(("translation", &curves.translation, elements::<3>(&curves.translation, buffer)));
+        tracks.push(("translation", &curves.translation, elements(&curves.translation, 3, buffer)));
     }
     if !curves.weights.keys[0].values.is_empty() {
-        tracks.push(("weights", &curves.weights, elements::<1>(&curves.weights, buffer)));
+        tracks.push(("weights", &curves.weights, elements(&curves.weights, 1, buffer)));
     }
     if tracks.is_empty() {
         return None;
@@ -26,7 +26,7 @@ pub(super) fn write(curves: &PerformanceCurves, buffer: &mut Buffer) -> Option<V
     let mut channels = Vec::new();
     for (path, curve, output) in tracks {
         let times: Vec<[f32; 1]> = curve.keys.iter().map(|k| [k.time_s]).collect();
-        let input = buffer.floats(&times, Target::None, true);
+        let input = buffer.floats(&times, Target::None, true, Precision::Exact);
         let interpolation = match curve.interpolation {
             Interpolation::Step => "STEP",
             Interpolation::Linear => "LINEAR",
@@ -38,9 +38,9 @@ pub(super) fn write(curves: &PerformanceCurves, buffer: &mut Buffer) -> Option<V
     Some(json!({"name": "performance", "samplers": samplers, "channels": channels}))
 }
 
-/// Values of all keys; a cubic has slope in, value, slope out for each. `N` numbers an element: weights are scalars,
-/// all targets of a key after each other.
-fn elements<const N: usize>(curve: &Curve, buffer: &mut Buffer) -> usize {
+/// Values of all keys; a cubic has slope in, value, slope out for each. Weights are scalars, all targets of a key after
+/// each other.
+fn elements(curve: &Curve, size: usize, buffer: &mut Buffer) -> usize {
     let mut numbers: Vec<f32> = Vec::new();
     for key in &curve.keys {
         match curve.interpolation {
@@ -52,5 +52,9 @@ fn elements<const N: usize>(curve: &Curve, buffer: &mut Buffer) -> usize {
             Interpolation::Step | Interpolation::Linear => numbers.extend(&key.values),
         }
     }
-    buffer.floats(numbers.as_chunks::<N>().0, Target::None, false)
+    match size {
+        4 => buffer.floats(numbers.as_chunks::<4>().0, Target::None, false, Precision::Exact),
+        3 => buffer.floats(numbers.as_chunks::<3>().0, Target::None, false, Precision::Exact),
+        _ => buffer.rows(&numbers, curve.keys[0].values.len(), WEIGHT),
+    }
 }

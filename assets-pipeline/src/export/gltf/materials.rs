@@ -12,6 +12,7 @@ use super::Options;
 use super::buffer::Buffer;
 use crate::error::ExportError;
 use crate::export::TextureFormat;
+use crate::export::eye_mouth::{EYE_TRANSFORM, TEETH_TRANSFORM};
 use crate::export::image_codec::encode_picture;
 use crate::export::pictures::{Picture, Pictures, appearance};
 
@@ -21,6 +22,9 @@ const WEBP: &str = "EXT_texture_webp";
 const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
 /// glTF extension of materials that show their colour without light.
 const UNLIT: &str = "KHR_materials_unlit";
+/// glTF extensions of reflection head on, and of its strength.
+const IOR: &str = "KHR_materials_ior";
+const SPECULAR: &str = "KHR_materials_specular";
 /// glTF extension of emission above 1.
 const EMISSIVE_STRENGTH: &str = "KHR_materials_emissive_strength";
 
@@ -35,6 +39,16 @@ pub(super) struct Materials {
 }
 
 impl Materials {
+    /// Shows every image in a texture, also those of the extension alone: some programs keep no others.
+    pub(super) fn show_all(&mut self, images: usize) {
+        let shown = |t: &Value| t["source"].as_u64().or(t["extensions"][WEBP]["source"].as_u64());
+        for image in 0..images {
+            if !self.textures.iter().any(|t| shown(t) == Some(image as u64)) {
+                self.textures.push(json!({"sampler": 0, "source": image}));
+            }
+        }
+    }
+
     pub(super) fn put_into(self, document: &mut Value) {
         document["materials"] = Value::Array(self.materials);
         if let Some(used) = document["extensionsUsed"].as_array_mut() {
@@ -206,8 +220,19 @@ pub(super) fn write(
     };
     let base_color = texture("base colour", &pictures.base_color)?;
     let normal = texture("normals", &pictures.normals)?;
+    let gloss = texture("visibility and roughness", &pictures.gloss)?;
+    let specular = texture("strength of reflection", &pictures.specular)?;
     let eye = texture("eye", &pictures.eye)?;
+    let teeth = texture("teeth", &pictures.teeth)?;
     let lash = texture("lashes", &pictures.lashes)?;
+    let mut moved = |info: &Option<Value>, (offset, scale): ([f32; 2], [f32; 2])| {
+        info.clone().map(|mut info| {
+            info["extensions"][TEXTURE_TRANSFORM] = json!({"offset": offset, "scale": scale});
+            out.extensions.insert(TEXTURE_TRANSFORM);
+            info
+        })
+    };
+    let (eye, teeth) = (moved(&eye, EYE_TRANSFORM), moved(&teeth, TEETH_TRANSFORM));
     let mut images = HashMap::new();
     for (index, part) in head.mesh.parts.iter().enumerate() {
         if let Some(material) = head.authored_material(index) {
@@ -215,24 +240,38 @@ pub(super) fn write(
             out.materials.push(material);
             continue;
         }
-        let look = appearance(part.material, base_color.is_some());
+        let texture = match part.material {
+            Material::Skin => &base_color,
+            Material::Eye => &eye,
+            Material::Teeth => &teeth,
+            Material::Lash => &lash,
+            _ => &None,
+        };
+        let look = appearance(head, part.material, texture.is_some());
         let mut material = json!({
             "name": part.name,
             "pbrMetallicRoughness": {
                 "baseColorFactor": look.color_linear, "metallicFactor": 0.0, "roughnessFactor": look.roughness,
             },
+            "extensions": {IOR: {"ior": look.ior}, SPECULAR: {"specularFactor": look.specular}},
         });
-        let texture = match part.material {
-            Material::Skin => &base_color,
-            Material::Eye => &eye,
-            Material::Lash => &lash,
-            _ => &None,
-        };
+        out.extensions.extend([IOR, SPECULAR]);
         if let Some(texture) = texture {
             material["pbrMetallicRoughness"]["baseColorTexture"] = texture.clone();
         }
-        if let (Material::Skin, Some(normal)) = (part.material, &normal) {
-            material["normalTexture"] = normal.clone();
+        if part.material == Material::Skin {
+            if let Some(normal) = &normal {
+                material["normalTexture"] = normal.clone();
+            }
+            if let Some(gloss) = &gloss {
+                material["pbrMetallicRoughness"]["roughnessFactor"] = json!(1.0);
+                material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = gloss.clone();
+                material["occlusionTexture"] = gloss.clone();
+            }
+            if let Some(specular) = &specular {
+                material["extensions"][SPECULAR] =
+                    json!({"specularFactor": 1.0, "specularTexture": specular});
+            }
         }
         if !part.material.is_opaque() {
             material["alphaMode"] = json!("BLEND");

@@ -6,6 +6,7 @@ use rubor_rig::head::{Head, Material};
 
 use super::{Layer, Options, mesh};
 use crate::error::ExportError;
+use crate::export::eye_mouth::{EYE_TRANSFORM, TEETH_TRANSFORM};
 use crate::export::image_codec::encode_picture;
 use crate::export::pictures::{Picture, Pictures, appearance};
 
@@ -27,17 +28,23 @@ pub(super) fn write(
     let base_color = save("base_color", &pictures.base_color)?;
     let normals = save("normals", &pictures.normals)?;
     let eye = save("eye", &pictures.eye)?;
+    let teeth = save("teeth", &pictures.teeth)?;
     let lashes = save("lashes", &pictures.lashes)?;
     let out = &mut layer.text;
     out.push_str("    def Scope \"Looks\"\n    {\n");
-    for (part, name) in head.mesh.parts.iter().zip(mesh::looks(head)) {
-        let look = appearance(part.material, base_color.is_some());
-        let (color, normal) = match part.material {
-            Material::Skin => (&base_color, &normals),
-            Material::Eye => (&eye, &None),
-            Material::Lash => (&lashes, &None),
-            _ => (&None, &None),
+    for (index, (part, name)) in head.mesh.parts.iter().zip(mesh::looks(head)).enumerate() {
+        let (color, normal, moved) = match part.material {
+            Material::Skin => (&base_color, &normals, None),
+            Material::Eye => (&eye, &None, Some(EYE_TRANSFORM)),
+            Material::Teeth => (&teeth, &None, Some(TEETH_TRANSFORM)),
+            Material::Lash => (&lashes, &None, None),
+            _ => (&None, &None, None),
         };
+        let mut look = appearance(head, part.material, color.is_some());
+        if let Some(material) = head.authored_material(index).map(|m| &head.authored.materials[m as usize]) {
+            look.color_linear = material.base_color;
+            look.roughness = material.roughness;
+        }
         let path = format!("/rubor_head/Looks/{name}");
         let [r, g, b, alpha] = look.color_linear;
         let _ = write!(
@@ -69,19 +76,21 @@ pub(super) fn write(
         }
         let _ = write!(
             out,
-            "                float inputs:roughness = {}\n                token outputs:surface\n            }}\n",
-            look.roughness
+            "                float inputs:roughness = {}\n                float inputs:ior = {}\n                \
+             token outputs:surface\n            }}\n",
+            look.roughness, look.ior
         );
         if let Some(file) = color {
             let alpha =
                 if part.material == Material::Lash { "                float outputs:a\n" } else { "" };
-            texture(out, &path, "Color", file, "sRGB", alpha);
+            let coordinates = if moved.is_some() { "Moved" } else { "Coordinates" };
+            texture(out, (&path, coordinates), "Color", file, "sRGB", alpha);
         }
         if let Some(file) = normal {
             // Eight bits to -1 to 1.
             let range = "                float4 inputs:bias = (-1, -1, -1, 0)\n                \
                          float4 inputs:scale = (2, 2, 2, 1)\n";
-            texture(out, &path, "Normal", file, "raw", range);
+            texture(out, (&path, "Coordinates"), "Normal", file, "raw", range);
         }
         if color.is_some() || normal.is_some() {
             out.push_str(
@@ -90,19 +99,38 @@ pub(super) fn write(
                  string inputs:varname = \"st\"\n                float2 outputs:result\n            }\n",
             );
         }
+        if let (Some(([u, v], [width, height])), true) = (moved, color.is_some()) {
+            // Texture coordinates of USD grow upwards.
+            let v = 1.0 - v - height;
+            let _ = write!(
+                out,
+                "\n            def Shader \"Moved\"\n            {{\n                \
+                 uniform token info:id = \"UsdTransform2d\"\n                \
+                 float2 inputs:in.connect = <{path}/Coordinates.outputs:result>\n                \
+                 float2 inputs:scale = ({width}, {height})\n                \
+                 float2 inputs:translation = ({u}, {v})\n                float2 outputs:result\n            }}\n"
+            );
+        }
         out.push_str("        }\n\n");
     }
     out.push_str("    }\n");
     Ok(())
 }
 
-fn texture(out: &mut String, path: &str, name: &str, file: &str, color_space: &str, more: &str) {
+fn texture(
+    out: &mut String,
+    (path, coordinates): (&str, &str),
+    name: &str,
+    file: &str,
+    color_space: &str,
+    more: &str,
+) {
     let _ = write!(
         out,
         "\n            def Shader \"{name}\"\n            {{\n                \
          uniform token info:id = \"UsdUVTexture\"\n                asset inputs:file = @./{file}@\n                \
          token inputs:sourceColorSpace = \"{color_space}\"\n                \
-         float2 inputs:st.connect = <{path}/Coordinates.outputs:result>\n                \
+         float2 inputs:st.connect = <{path}/{coordinates}.outputs:result>\n                \
          token inputs:wrapS = \"clamp\"\n                token inputs:wrapT = \"clamp\"\n{more}                \
          float3 outputs:rgb\n            }}\n"
     );

@@ -329,6 +329,7 @@ fn note_lost(head: &Head, options: &Options<'_>, notes: &mut Vec<String>) {
                 .into(),
         );
     }
+    notes.extend(super::authored_lost(head, "USD"));
     if let Some(rig) = options.rig {
         let resolver = Resolver::shapes(head);
         let combinations = rig.combinations.iter().filter(|c| !resolver.resolve(&c.shape).is_empty()).count();

@@ -22,6 +22,7 @@ mod motion;
 mod names;
 mod own;
 mod placement;
+mod recovered;
 mod shapes;
 mod vrm;
 mod weld;
@@ -84,7 +85,9 @@ pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError
     let mut notes = Notes::default();
     let document = Document::load(bytes, path, &mut notes)?;
     let motion = Motion::read(&document, &mut notes);
-    let (mut imported, shapes) = match document.gltf.extension_value(NAME) {
+    let extension = document.gltf.extension_value(NAME).cloned();
+    let extension = extension.or_else(|| recovered::extension(&document, &mut notes));
+    let (mut imported, shapes) = match &extension {
         Some(extension) => own::read(&document, extension, &motion, &mut notes)?,
         None => {
             let read = foreign::read(&document, &motion, &mut notes)?;
