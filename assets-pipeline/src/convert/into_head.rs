@@ -87,6 +87,22 @@ pub fn put_chromophores(
     Ok(())
 }
 
+/// Puts a linear Rec. 709 albedo of 3 channels into a head as the colour that its skin has by itself. Hair that was to be
+/// drawn with the skin goes: that colour has its own.
+///
+/// # Errors
+/// Other channels.
+pub fn put_albedo(head: &mut Head, albedo: Map, origin: &Origin) -> Result<(), ConvertError> {
+    if albedo.channels != 3 {
+        return Err(ConvertError::argument("albedo", format!("{} channels", albedo.channels), "3"));
+    }
+    let values = albedo.values.iter().map(|v| v.clamp(0.0, 1.0)).collect();
+    head.maps.albedo = Some(Map { values, ..albedo });
+    head.maps.hair = None;
+    origin.stamp(head, "albedo");
+    Ok(())
+}
+
 /// Local mean of a hemoglobin map over the skin of a head, at the size of its distributions.
 ///
 /// # Errors
@@ -257,6 +273,16 @@ mod tests {
         let mean = head.maps.hemoglobin_mean.as_ref().unwrap();
         assert_eq!((mean.width, mean.values[9]), (8, 0.01));
         assert!((head.maps.distributions[0].bias.values[5] - 0.015).abs() < 1e-7);
+    }
+
+    #[test]
+    fn a_colour_of_its_own_has_its_own_hair() {
+        let mut head = head();
+        head.maps.hair = Some(Map::filled(4, 4, &[1.0]));
+        put_albedo(&mut head, Map::filled(4, 4, &[1.2, 0.5, -0.1]), &origin()).unwrap();
+        assert!(head.validate().is_ok() && head.maps.hair.is_none());
+        assert_eq!(head.maps.albedo.as_ref().unwrap().values[..3], [1.0, 0.5, 0.0]);
+        assert!(put_albedo(&mut head, Map::filled(4, 4, &[1.0]), &origin()).is_err());
     }
 
     #[test]

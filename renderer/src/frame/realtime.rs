@@ -18,7 +18,8 @@ pub(crate) fn record(
     frame.pose(r);
     let light = frame.light(r);
     if frame.needs.before_view {
-        diffusion.before_view(r, &frame.before(r, &light));
+        let before = frame.before(r, &light);
+        diffusion.before_view(r, &before);
     }
 
     let mut samples = Samples::default();

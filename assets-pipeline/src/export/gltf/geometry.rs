@@ -73,7 +73,7 @@ pub(super) fn primitives(
             let rest = vec![[colors.rest; 3]; vertices.len()];
             primitive["attributes"]["COLOR_0"] = json!(buffer.floats(&rest, Target::Vertices, false));
         }
-        let is_authored = head.authored_material(material).is_some();
+        let is_authored = head.needed_material(material).is_some();
         if is_authored {
             let second: Vec<_> =
                 vertices.iter().map(|v| head.authored.second_uv(*v)).map(|uv| uv.to_array()).collect();
