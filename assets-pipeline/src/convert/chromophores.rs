@@ -13,7 +13,7 @@
 //! skin changes by the same share as the skin around it: dark hair hardly, painted skin as much as skin.
 //!
 //! The gain brings the values of a picture to reflectances for the fit alone. Where it is not given it is estimated: the one
-//! at which most colours are colours of skin ([`estimate_exposure`]).
+//! at which most colours are colours of skin, and what cast their median then has ([`estimate_exposure`]).
 
 use rayon::prelude::*;
 use rubor_rig::color::srgb_decode;
@@ -40,8 +40,21 @@ const LEAST_SKIN: f64 = 0.02;
 /// Blood of a painted skin, volume fraction: that of pale to ruddy faces.
 const PAINTED_BLOOD: std::ops::RangeInclusive<f32> = 0.01..=0.035;
 
-/// Gains that an estimate tries: from 2 stops below to 1 above, in quarters of a stop.
-const GAIN_QUARTER_STOPS: std::ops::RangeInclusive<i32> = -8..=4;
+/// Gains that an estimate tries: from a stop below to half a stop above, in quarters of a stop.
+const GAIN_QUARTER_STOPS: std::ops::RangeInclusive<i32> = -4..=2;
+
+/// Gains that pictures of skin mostly have: painters and cameras make it brighter than it is.
+const USUAL_GAINS: std::ops::RangeInclusive<f32> = 0.7..=1.0;
+
+/// What a gain outside of those must be better by per stop, CIEDE2000: pale paint fits dark skin well when it is darkened
+/// enough, and would then hardly show its blood.
+const UNUSUAL: f32 = 3.0;
+
+/// Residual of the median colour from which on a colour cast is removed before colours are fitted, CIEDE2000.
+const SEEN_CAST: f32 = 1.0;
+
+/// Largest factor, and one over the least, of a component that a cast is removed with, relative to its gain.
+const MOST_CAST: f32 = 1.35;
 
 /// Colours of which an exposure is estimated.
 const EXPOSURE_SAMPLES: usize = 600;
@@ -81,6 +94,8 @@ impl Default for Options {
 pub struct Exposure {
     /// Reflectance over value.
     pub gain: f32,
+    /// Factors of red, green and blue that remove a colour cast, on top of the gain.
+    pub balance: [f32; 3],
     /// Least and largest gain that fit about as well.
     pub range: [f32; 2],
     /// 0 to 1: the share of the colours that are colours of skin at this gain, less the more the wider the range is. 1 for
@@ -91,7 +106,19 @@ pub struct Exposure {
 impl std::fmt::Display for Exposure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [low, high] = self.range;
-        write!(f, "{:.2} ({low:.2} to {high:.2}, confidence {:.2})", self.gain, self.confidence)
+        write!(f, "{:.2} ({low:.2} to {high:.2}, confidence {:.2})", self.gain, self.confidence)?;
+        let [r, g, b] = self.balance;
+        if self.balance == [1.0; 3] {
+            return Ok(());
+        }
+        write!(f, ", less a cast of {:.2} {:.2} {:.2}", 1.0 / r, 1.0 / g, 1.0 / b)
+    }
+}
+
+impl Exposure {
+    /// A colour of the picture as reflectance.
+    fn of(&self, color: [f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|c| self.gain * self.balance[c] * color[c])
     }
 }
 
@@ -149,12 +176,12 @@ pub fn linear_albedo(image: &LoadedImage, encoding: AlbedoEncoding) -> Result<Ma
     Ok(map)
 }
 
-/// The gain at which the mapped colours of a linear Rec. 709 albedo are colours of skin. 1 where no other is clearly
-/// better.
+/// The gain at which the mapped colours of a linear Rec. 709 albedo are colours of skin, 1 where no other is clearly better,
+/// and the cast that their median still has.
 pub fn estimate_exposure(albedo_linear: &Map, mask: &Mask, lookup: &SkinLookup, threshold: f32) -> Exposure {
     let colors = spread(albedo_linear, mask, EXPOSURE_SAMPLES);
     if colors.is_empty() {
-        return Exposure { gain: 1.0, range: [1.0; 2], confidence: 0.0 };
+        return Exposure { gain: 1.0, balance: [1.0; 3], range: [1.0; 2], confidence: 0.0 };
     }
     let inverse = SkinInverse::new(lookup);
     // Residuals beyond twice the threshold say that a colour is no skin, and no more.
@@ -168,7 +195,9 @@ pub fn estimate_exposure(albedo_linear: &Map, mask: &Mask, lookup: &SkinLookup, 
             })
             .collect();
         let inside = residuals.iter().filter(|r| **r <= f64::from(threshold)).count();
-        (residuals.iter().sum::<f64>() / residuals.len() as f64, inside as f64 / residuals.len() as f64)
+        let stops = (USUAL_GAINS.start() / gain).log2().max((gain / USUAL_GAINS.end()).log2()).max(0.0);
+        let mean = residuals.iter().sum::<f64>() / residuals.len() as f64;
+        (mean + f64::from(UNUSUAL * stops), inside as f64 / residuals.len() as f64)
     };
     let gains: Vec<f32> = GAIN_QUARTER_STOPS.map(|i| (i as f32 / 4.0).exp2()).collect();
     let tried: Vec<(f64, f64)> = gains.iter().map(|g| try_gain(*g)).collect();
@@ -184,9 +213,21 @@ pub fn estimate_exposure(albedo_linear: &Map, mask: &Mask, lookup: &SkinLookup, 
     let stops = (last - first) as f64 / 4.0;
     Exposure {
         gain: gains[best],
+        balance: balance(median(colors.clone()).map(|c| gains[best] * c), &inverse, lookup),
         range: [gains[first], gains[last]],
         confidence: (tried[best].1 * (1.0 - stops / 3.0)) as f32,
     }
+}
+
+/// Factors that bring the median of skin to a colour of skin.
+fn balance(median: [f32; 3], inverse: &SkinInverse<'_>, lookup: &SkinLookup) -> [f32; 3] {
+    let nearest = inverse.fit(median);
+    if nearest.residual <= SEEN_CAST {
+        return [1.0; 3];
+    }
+    let blood = nearest.hemoglobin.clamp(*PAINTED_BLOOD.start(), *PAINTED_BLOOD.end());
+    let skin = lookup.sample(inverse.fit_melanin(median, blood).melanin, blood);
+    [0, 1, 2].map(|c| (skin[c] / median[c].max(1e-3)).clamp(1.0 / MOST_CAST, MOST_CAST))
 }
 
 /// At most `count` mapped colours, spread evenly over the mapped texels.
@@ -202,14 +243,14 @@ fn is_saturated(fit: &ChromophoreFit) -> bool {
     fit.hemoglobin > SATURATED * MAX_HEMOGLOBIN as f32
 }
 
-/// Fits of colours times a gain. Pictures have few colours for their texels, so each is fitted once.
-fn fits(albedo_linear: &Map, mask: &Mask, gain: f32, inverse: &SkinInverse<'_>) -> Vec<ChromophoreFit> {
+/// Fits of the colours of a picture. Pictures have few colours for their texels, so each is fitted once.
+fn fits(albedo_linear: &Map, mask: &Mask, exposure: &Exposure, inverse: &SkinInverse<'_>) -> Vec<ChromophoreFit> {
     let key = |c: &[f32]| [c[0], c[1], c[2]].map(f32::to_bits);
     let texels = || albedo_linear.values.par_chunks_exact(3).zip(&mask.mapped).with_min_len(4096);
     let mut colors: Vec<[u32; 3]> = texels().filter(|(_, m)| **m).map(|(c, _)| key(c)).collect();
     colors.par_sort_unstable();
     colors.dedup();
-    let fit = |c: &[u32; 3]| inverse.fit(c.map(|v| gain * f32::from_bits(v)));
+    let fit = |c: &[u32; 3]| inverse.fit(exposure.of(c.map(f32::from_bits)));
     let known: Vec<ChromophoreFit> = colors.par_iter().with_min_len(256).map(fit).collect();
     let empty = ChromophoreFit { melanin: 0.0, hemoglobin: 0.0, residual: 0.0 };
     let found = |c: &[f32]| colors.binary_search(&key(c)).map_or(empty, |i| known[i]);
@@ -242,11 +283,11 @@ pub fn convert(
         return Err(ConvertError::argument("gain", gain.to_string(), "a positive number"));
     }
     let exposure = match gain {
-        Some(gain) => Exposure { gain, range: [gain; 2], confidence: 1.0 },
+        Some(gain) => Exposure { gain, balance: [1.0; 3], range: [gain; 2], confidence: 1.0 },
         None => estimate_exposure(albedo_linear, mask, lookup, threshold),
     };
     let inverse = SkinInverse::new(lookup);
-    let fits = fits(albedo_linear, mask, exposure.gain, &inverse);
+    let fits = fits(albedo_linear, mask, &exposure, &inverse);
     let map = |value: fn(&ChromophoreFit) -> f32| Map {
         width,
         height,
@@ -274,7 +315,7 @@ pub fn convert(
     summary.mean_residual_inside /= inside.max(1) as f64;
     summary.is_painted = summary.mapped_texels > 0 && (inside as f64) < LEAST_SKIN * mapped;
     if summary.is_painted {
-        let median = median_color(albedo_linear, mask).map(|c| exposure.gain * c);
+        let median = exposure.of(median(spread(albedo_linear, mask, 4096)));
         let blood = inverse.fit(median).hemoglobin.clamp(*PAINTED_BLOOD.start(), *PAINTED_BLOOD.end());
         melanin.values.fill(inverse.fit_melanin(median, blood).melanin);
         hemoglobin.values.fill(blood);
@@ -338,8 +379,7 @@ fn take_from_around(map: &mut Map, weights: &Map) {
 }
 
 /// The median of each component.
-fn median_color(albedo_linear: &Map, mask: &Mask) -> [f32; 3] {
-    let colors = spread(albedo_linear, mask, 4096);
+fn median(colors: Vec<[f32; 3]>) -> [f32; 3] {
     [0, 1, 2].map(|c| {
         let mut values: Vec<f32> = colors.iter().map(|color| color[c]).collect();
         values.sort_unstable_by(f32::total_cmp);

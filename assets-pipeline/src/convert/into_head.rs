@@ -12,6 +12,7 @@ use super::ConvertError;
 use super::hemoglobin::{HemoglobinMaps, default_radius};
 use super::skin_texels::SkinTexels;
 use super::transfer::{BiasTransfer, Warp, transfer};
+use crate::synthesize::strands::hide_brows;
 
 /// Where maps come from, for the provenance of a head.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,7 +89,7 @@ pub fn put_chromophores(
 }
 
 /// Puts a linear Rec. 709 albedo of 3 channels into a head as the colour that its skin has by itself. Hair that was to be
-/// drawn with the skin goes: that colour has its own.
+/// drawn with the skin goes, and brows that were grown are hidden: that colour has its own.
 ///
 /// # Errors
 /// Other channels.
@@ -99,6 +100,7 @@ pub fn put_albedo(head: &mut Head, albedo: Map, origin: &Origin) -> Result<(), C
     let values = albedo.values.iter().map(|v| v.clamp(0.0, 1.0)).collect();
     head.maps.albedo = Some(Map { values, ..albedo });
     head.maps.hair = None;
+    hide_brows(head);
     origin.stamp(head, "albedo");
     Ok(())
 }
@@ -221,6 +223,7 @@ mod tests {
     use super::super::skin_texels::tests::sheet;
     use super::*;
     use glam::Vec2;
+    use rubor_rig::head::Material;
     use rubor_rig::mask::Mask;
 
     fn origin() -> Origin {
@@ -279,8 +282,11 @@ mod tests {
     fn a_colour_of_its_own_has_its_own_hair() {
         let mut head = head();
         head.maps.hair = Some(Map::filled(4, 4, &[1.0]));
+        let brows = rubor_rig::head::Part { name: "brows".into(), material: Material::Hair, triangles: 2..2 };
+        head.mesh.parts.push(brows);
         put_albedo(&mut head, Map::filled(4, 4, &[1.2, 0.5, -0.1]), &origin()).unwrap();
         assert!(head.validate().is_ok() && head.maps.hair.is_none());
+        assert_eq!(head.mesh.parts[1].material, Material::Hidden);
         assert_eq!(head.maps.albedo.as_ref().unwrap().values[..3], [1.0, 0.5, 0.0]);
         assert!(put_albedo(&mut head, Map::filled(4, 4, &[1.0]), &origin()).is_err());
     }

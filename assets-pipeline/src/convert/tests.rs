@@ -160,8 +160,14 @@ fn the_exposure_of_a_picture_is_found_and_its_confidence_said() {
     let threshold = chromophores::DEFAULT_GAMUT_THRESHOLD;
     let true_one = chromophores::estimate_exposure(&exposed(&lookup, 1.0), &full, &lookup, threshold);
     assert_eq!(true_one.gain, 1.0);
-    let bright = chromophores::estimate_exposure(&exposed(&lookup, 1.6), &full, &lookup, threshold);
-    assert!(bright.gain < 0.8 && bright.range[0] <= 1.0 / 1.6 && bright.range[1] >= 1.0 / 1.7, "{bright}");
+    let bright = chromophores::estimate_exposure(&exposed(&lookup, 1.45), &full, &lookup, threshold);
+    assert!((1.45 * bright.gain - 1.0).abs() < 0.1 && bright.range[1] < 1.0, "{bright}");
+    // The cast of a warm lamp is found where no gain alone makes it skin.
+    let mut warm = exposed(&lookup, 1.0);
+    warm.values.chunks_exact_mut(3).for_each(|c| c[2] *= 0.8);
+    let warm = chromophores::estimate_exposure(&warm, &full, &lookup, threshold);
+    assert!(warm.balance[2] > 1.1 * warm.balance[0], "{warm}");
+    assert_eq!((true_one.balance, bright.balance), ([1.0; 3], [1.0; 3]));
     // A green picture has no exposure at which it is skin.
     let green = Map::filled(24, 24, &[0.1, 0.6, 0.1]);
     let none = chromophores::estimate_exposure(&green, &full, &lookup, threshold);

@@ -22,7 +22,7 @@ mod noise;
 mod regions;
 mod relief;
 mod specular;
-mod strands;
+pub(crate) mod strands;
 mod surface;
 #[cfg(test)]
 mod tests;

@@ -106,7 +106,7 @@ pub(super) fn run(a: &ChromophoresArgs, notes: &mut Vec<Note>) -> Outcome<Value>
         receiver.head.maps.albedo = None;
     } else {
         if receiver.head.maps.hair.is_some() {
-            let message = "the hair map of the head is left out: the colour of its skin has its own hair";
+            let message = "the hair map of the head and its grown brows are left out: the colour of its skin has its own hair";
             notes.push(Note::new(&about, message));
         }
         into_head::put_albedo(&mut receiver.head, filled(albedo, &mask), &origin)?;
