@@ -114,7 +114,7 @@ pub struct PartEntry {
     pub name: String,
     /// How it is shaded.
     pub material: Material,
-    /// It is drawn in the glTF material of its primitive.
+    /// It is drawn in the glTF material of its primitive; of skin that material says where it has holes.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub authored: bool,
     /// Accessor: point of each vertex of the primitive, SCALAR, unsigned short or int.
@@ -137,6 +137,9 @@ pub struct ShapeOcclusionEntry {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub struct MapEntries {
+    /// Colour that the neutral skin has by itself, linear Rec. 709, 3 channels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub albedo: Option<MapEntry>,
     /// Volume fraction of melanin in the epidermis.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub melanin: Option<MapEntry>,
@@ -200,6 +203,8 @@ pub enum ChannelLayout {
     Stacked,
     /// The first two channels of a colour image.
     Interleaved,
+    /// Three channels: a colour image in sRGB, decoded before offset and scale.
+    Color,
     /// One of the four channels of an RGBA image, named by [`ZoneEntry::channel`].
     Channel,
 }

@@ -5,7 +5,9 @@ use std::path::Path;
 use glam::Vec2;
 use rubor_assets::export::gltf::{Options, to_bytes};
 use rubor_assets::import::gltf::{ImportedHead, from_bytes};
+use rubor_assets::convert::own_color;
 use rubor_rig::authored::{AlphaMode, Wrap};
+use rubor_rig::color::srgb_encode;
 use rubor_rig::head::Material;
 use serde_json::{Value, json};
 
@@ -97,7 +99,19 @@ fn rich() -> Value {
         "emissiveFactor": [1.0, 0.5, 0.0],
         "emissiveTexture": {"index": 0},
         "alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": true,
-        "extensions": {"KHR_materials_unlit": {}, "KHR_materials_emissive_strength": {"emissiveStrength": 4.0}},
+        "extensions": {
+            "KHR_materials_unlit": {}, "KHR_materials_emissive_strength": {"emissiveStrength": 4.0},
+            "KHR_materials_ior": {"ior": 1.25},
+            "KHR_materials_specular": {
+                "specularFactor": 0.5, "specularTexture": {"index": 0},
+                "specularColorFactor": [1.0, 2.0, 0.5], "specularColorTexture": {"index": 0},
+            },
+            "KHR_materials_clearcoat": {
+                "clearcoatFactor": 0.75, "clearcoatTexture": {"index": 0},
+                "clearcoatRoughnessFactor": 0.25, "clearcoatRoughnessTexture": {"index": 0},
+            },
+            "KHR_materials_transmission": {"transmissionFactor": 0.5, "transmissionTexture": {"index": 0}},
+        },
     })
 }
 
@@ -120,6 +134,10 @@ fn all_that_a_material_says_comes_along_and_stays_in_own_files() {
         assert_eq!((material.normal_scale, material.occlusion_strength), (-0.5, 0.5));
         assert_eq!(material.emission_linear, [4.0, 2.0, 0.0]);
         assert_eq!(material.alpha, AlphaMode::Mask { cutoff: 0.25 });
+        assert_eq!((material.ior, material.specular), (1.25, 0.5));
+        assert_eq!(material.specular_color, [1.0, 2.0, 0.5]);
+        assert_eq!((material.clearcoat, material.clearcoat_roughness), (0.75, 0.25));
+        assert_eq!(material.transmission, 0.5);
         assert!(material.is_double_sided && material.is_unlit);
         assert!(material.textures().iter().all(|(_, t)| t.is_some()));
         let base = material.base_color_texture.unwrap();
@@ -157,8 +175,60 @@ fn textured_parts_keep_their_look() {
     let materials = json!([textured("eye"), textured("teeth"), textured("skin"), textured("eyeshadow")]);
     let parts = [("a", Some(0)), ("b", Some(1)), ("c", Some(2)), ("d", Some(3))];
     let imported = import(&document(&parts, materials));
-    assert_eq!(kinds(&imported), [Material::Other, Material::Other, Material::Other, Material::Hidden]);
+    // Skin keeps its colour in a way of its own.
+    assert_eq!(kinds(&imported), [Material::Other, Material::Other, Material::Skin, Material::Hidden]);
     says(&imported, "keep the look of their author", "teeth");
+}
+
+#[test]
+fn textured_skin_keeps_its_colour_in_own_files() {
+    let textured = json!([{
+        "name": "Wolf3D_Skin", "alphaMode": "MASK",
+        "pbrMetallicRoughness": {"metallicFactor": 0.0, "baseColorTexture": {"index": 0}},
+    }]);
+    let mut foreign = import(&document(&[("Wolf3D_Head", Some(0))], textured));
+    foreign.head.authored.colors_linear.clear();
+    // The texture has two texels, and the triangle shows both.
+    let notes = own_color::adopt(&mut foreign.head, &own_color::Options::default()).unwrap();
+    assert!(notes.iter().any(|n| n.to_string().contains("own colour")), "{notes:?}");
+    let bytes = to_bytes(&foreign.head, &Options::default()).unwrap();
+    let own = from_bytes(&bytes, Path::new("own.glb")).unwrap();
+    for head in [&foreign.head, &own.head] {
+        assert_eq!(head.mesh.parts[0].material, Material::Skin);
+        let albedo = head.maps.albedo.as_ref().unwrap();
+        let codes: Vec<u8> = albedo.values.iter().map(|v| (srgb_encode(*v) * 255.0).round() as u8).collect();
+        assert_eq!(codes, [255, 0, 0, 10, 20, 30]);
+        // Its alpha of 128 is above the cutoff: there are no holes.
+        assert_eq!(head.hole_material(0), None);
+    }
+    assert_eq!(own.head.maps.albedo, foreign.head.maps.albedo);
+    // Other viewers show that very picture: the document holds it once.
+    let document = gltf::Gltf::from_slice(&bytes).unwrap();
+    let material = document.materials().next().unwrap();
+    let shown = material.pbr_metallic_roughness().base_color_texture().unwrap().texture().source().unwrap().index();
+    let extension = document.document.into_json().extensions.unwrap();
+    let text = serde_json::to_value(extension).unwrap();
+    assert_eq!(text["RUBOR_facial_appearance"]["maps"]["albedo"]["image"], json!(shown));
+    assert_eq!(to_bytes(&own.head, &Options::default()).unwrap(), bytes);
+}
+
+#[test]
+fn holes_of_skin_stay_in_own_files() {
+    let textured = json!([{
+        "name": "skin", "alphaMode": "MASK", "alphaCutoff": 0.75,
+        "pbrMetallicRoughness": {"metallicFactor": 0.0, "baseColorTexture": {"index": 0}},
+    }]);
+    let mut foreign = import(&document(&[("head", Some(0))], textured));
+    own_color::adopt(&mut foreign.head, &own_color::Options::default()).unwrap();
+    let bytes = to_bytes(&foreign.head, &Options::default()).unwrap();
+    let own = from_bytes(&bytes, Path::new("own.glb")).unwrap();
+    for head in [&foreign.head, &own.head] {
+        assert_eq!((head.mesh.parts[0].material, head.authored_material(0)), (Material::Skin, None));
+        let material = &head.authored.materials[head.hole_material(0).unwrap() as usize];
+        assert_eq!(material.alpha, AlphaMode::Mask { cutoff: 0.75 });
+        assert!(material.base_color_texture.is_some());
+    }
+    assert_eq!(to_bytes(&own.head, &Options::default()).unwrap(), bytes);
 }
 
 #[test]
@@ -181,7 +251,10 @@ fn what_cannot_be_read_is_said() {
             "baseColorTexture": {"index": 1}, "metallicRoughnessTexture": {"index": 2}, "roughnessFactor": 7.0,
         },
         "normalTexture": {"index": 99}, "occlusionTexture": {"index": 0, "texCoord": 2},
-        "extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 1.0}},
+        "extensions": {
+            "KHR_materials_sheen": {"sheenRoughnessFactor": 1.0}, "KHR_materials_ior": {"ior": 0.5},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 1.0, "clearcoatNormalTexture": {"index": 0}},
+        },
     });
     let imported = import(&document(&[("Torus", Some(0))], json!([material])));
     says(&imported, "picture cannot be read", "material 0, base colour (image 1: ");
@@ -189,9 +262,11 @@ fn what_cannot_be_read_is_said() {
     says(&imported, "textures that do not exist", "material 0, normal");
     says(&imported, "third set", "material 0, occlusion");
     says(&imported, "are clamped", "material 0 (7.0)");
-    says(&imported, "KHR_materials_clearcoat is not drawn", "material 0");
-    says(&imported, "blended materials", "material 0");
+    says(&imported, "KHR_materials_sheen is not drawn", "material 0");
+    says(&imported, "normal maps of clear coats", "material 0");
+    says(&imported, "are clamped", "material 0 (0.5)");
     let material = &imported.head.authored.materials[0];
     assert!(material.textures().iter().all(|(_, t)| t.is_none()));
+    assert_eq!((material.ior, material.clearcoat), (1.0, 1.0));
     assert_eq!((material.roughness, material.alpha), (1.0, AlphaMode::Blend));
 }

@@ -391,7 +391,7 @@ fn the_published_schema_names_the_properties() {
     let zone = json!({"name": "z", "wrinkleMap": 0, "channel": 0, "mask": map});
     let distribution = json!({"name": "joy", "scale": map, "bias": map});
     let maps = json!({
-        "melanin": map, "hemoglobin": map, "hemoglobinMean": map, "hair": map,
+        "albedo": map, "melanin": map, "hemoglobin": map, "hemoglobinMean": map, "hair": map,
         "hairColorLinear": [0.1, 0.1, 0.1], "slopes": map, "specular": map, "scattering": map,
         "wrinkleSlopes": [map], "zones": [zone], "distributions": [distribution],
     });

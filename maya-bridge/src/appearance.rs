@@ -112,6 +112,7 @@ impl Appearance {
             Ok::<(), Unencodable>(())
         };
         let single = [
+            ("albedo", &maps.albedo),
             ("melanin", &maps.melanin),
             ("hemoglobin", &maps.hemoglobin),
             ("hemoglobinMean", &maps.hemoglobin_mean),
@@ -159,6 +160,11 @@ impl Appearance {
                 }
             };
             match entry.role.as_str() {
+                "albedo" => {
+                    // Offset and scale may round past the ends.
+                    let values = map.values.iter().map(|v| v.clamp(0.0, 1.0)).collect();
+                    maps.albedo = Some(Map { values, ..map });
+                }
                 "melanin" => maps.melanin = Some(map),
                 "hemoglobin" => maps.hemoglobin = Some(map),
                 "hemoglobinMean" => maps.hemoglobin_mean = Some(map),

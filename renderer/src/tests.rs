@@ -12,7 +12,7 @@ use crate::channels::{CHANNELS, Channel, ChannelData};
 use crate::device::native;
 use crate::passes::geometry::{morph, shadow, tangent_frames, velocity, visibility};
 use crate::passes::hair::overlay;
-use crate::passes::{appearance, compose, display, resolve, shade};
+use crate::passes::{appearance, compose, display, resolve, see_through, shade};
 use crate::scene::authored::{GpuAuthoredVertex, GpuMaterial, GpuTexture};
 use crate::scene::head::GpuVertex;
 use crate::scene::lamp::GpuLight;
@@ -37,7 +37,11 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     for with_normals in [false, true] {
         assert_workgroups(&shade::samples_program(with_normals), &line("light_samples"));
     }
-    assert_workgroups(&shade::authored_program(), &square("shade_authored"));
+    for entry in ["shade_authored", "shade_layer"] {
+        assert_workgroups(&shade::authored_program(), &square(entry));
+    }
+    assert_workgroups(&see_through::behind_program(), &square("behind"));
+    assert_raster(&see_through::layer_program(), &["layer_vertex", "layer_fragment"]);
     assert_workgroups(&compose::program(), &square("compose"));
     for tone_map in ToneMap::all() {
         assert_workgroups(&display::program(tone_map), &square("display"));
@@ -88,7 +92,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
         "AuthoredMaterial",
         size_of::<GpuMaterial>(),
         &offsets!(GpuMaterial; base_color as "base_color", emission as "emission", factors as "factors",
-            flags as "flags", textures as "textures"),
+            coats as "coats", tint as "tint", cutoffs as "cutoffs", flags as "flags", textures as "textures"),
     );
     assert_layout(
         &shade::authored_program(),
@@ -131,7 +135,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             environment_intensity as "environment_intensity", environment_levels as "environment_levels",
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", hair_color as "hair_color",
             is_second_sample as "is_second_sample", transmit_per_mm as "transmit_per_mm",
-            adds_differences as "adds_differences", pupil_mm as "pupil_mm", lobes as "lobes", mm_per_texture as "mm_per_texture", ring_taps_mm as "ring_taps_mm",
+            skin_flags as "skin_flags", pupil_mm as "pupil_mm", lobes as "lobes", mm_per_texture as "mm_per_texture", ring_taps_mm as "ring_taps_mm",
             ring_ends_mm as "ring_ends_mm", middle as "middle", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(

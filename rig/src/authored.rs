@@ -1,7 +1,8 @@
 //! Materials that the authors of heads gave to parts: metallic-roughness with textures, as in glTF 2.0.
 //!
-//! A part of [`Material::Other`] that has one is drawn with it. Parts that are skin, eyes and so on may have one too: it is
-//! kept until the head is written, so that a part can be given back its own look.
+//! A part of [`Material::Other`] that has one is drawn with it. Skin that has one with an alpha cutoff has its holes and
+//! nothing else of it. Parts that are skin, eyes and so on may have one too: it is kept until the head is written, so that a
+//! part can be given back its own look.
 
 use glam::{Affine2, Mat2, Vec2};
 
@@ -68,6 +69,28 @@ pub struct AuthoredMaterial {
     pub is_double_sided: bool,
     /// Shows its base colour without light (`KHR_materials_unlit`).
     pub is_unlit: bool,
+    /// Index of refraction, 1 or more, or 0 for a reflectance of 1 (`KHR_materials_ior`).
+    pub ior: f32,
+    /// Strength of the reflection of what is no metal, 0 to 1 (`KHR_materials_specular`).
+    pub specular: f32,
+    /// Alpha is a factor of `specular`.
+    pub specular_texture: Option<AuthoredTexture>,
+    /// Factor of that reflection seen head on, linear Rec. 709, 0 or more.
+    pub specular_color: [f32; 3],
+    /// Factor of `specular_color`: sRGB.
+    pub specular_color_texture: Option<AuthoredTexture>,
+    /// Share of a clear coat on top, 0 to 1 (`KHR_materials_clearcoat`).
+    pub clearcoat: f32,
+    /// Red is a factor of `clearcoat`.
+    pub clearcoat_texture: Option<AuthoredTexture>,
+    /// Perceptual roughness of the coat, 0 to 1.
+    pub clearcoat_roughness: f32,
+    /// Green is a factor of `clearcoat_roughness`.
+    pub clearcoat_roughness_texture: Option<AuthoredTexture>,
+    /// Share of the light that is not reflected which passes through a thin wall, 0 to 1 (`KHR_materials_transmission`).
+    pub transmission: f32,
+    /// Red is a factor of `transmission`.
+    pub transmission_texture: Option<AuthoredTexture>,
 }
 
 /// A picture on a part.
@@ -155,24 +178,54 @@ impl Default for AuthoredMaterial {
             alpha: AlphaMode::Opaque,
             is_double_sided: false,
             is_unlit: false,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: [1.0; 3],
+            specular_color_texture: None,
+            clearcoat: 0.0,
+            clearcoat_texture: None,
+            clearcoat_roughness: 0.0,
+            clearcoat_roughness_texture: None,
+            transmission: 0.0,
+            transmission_texture: None,
         }
     }
 }
 
+/// Textures that a material can have.
+pub const TEXTURES: usize = 10;
+
 impl AuthoredMaterial {
-    /// All its textures with their names: base colour, metallic-roughness, normal, occlusion, emission.
-    pub fn textures(&self) -> [(&'static str, Option<&AuthoredTexture>); 5] {
+    /// All its textures with their names: base colour, metallic-roughness, normal, occlusion, emission, specular, specular
+    /// colour, clear coat, its roughness, transmission.
+    pub fn textures(&self) -> [(&'static str, Option<&AuthoredTexture>); TEXTURES] {
         [
             ("base colour", self.base_color_texture.as_ref()),
             ("metallic-roughness", self.metallic_roughness_texture.as_ref()),
             ("normal", self.normal_texture.as_ref()),
             ("occlusion", self.occlusion_texture.as_ref()),
             ("emission", self.emission_texture.as_ref()),
+            ("specular", self.specular_texture.as_ref()),
+            ("specular colour", self.specular_color_texture.as_ref()),
+            ("clear coat", self.clearcoat_texture.as_ref()),
+            ("clear coat roughness", self.clearcoat_roughness_texture.as_ref()),
+            ("transmission", self.transmission_texture.as_ref()),
         ]
     }
 
-    /// Alpha below which a part is not drawn where it is drawn opaque elsewhere; `None` where alpha means nothing.
-    /// Blended parts are cut at one half.
+    /// Whether what is behind it can show through: it is blended, or lets light pass.
+    pub fn is_see_through(&self) -> bool {
+        self.alpha == AlphaMode::Blend || self.transmission > 0.0
+    }
+
+    /// Reflectance head on of what is no metal, without specular factors.
+    pub fn dielectric_f0(&self) -> f32 {
+        ((self.ior - 1.0) / (self.ior + 1.0)).powi(2)
+    }
+
+    /// Alpha below which a part is not there for lamps, and skin not at all; `None` where alpha means nothing. Blended
+    /// parts are cut at one half.
     pub fn cutoff(&self) -> Option<f32> {
         match self.alpha {
             AlphaMode::Opaque => None,
@@ -188,6 +241,18 @@ impl Head {
     pub fn authored_material(&self, part: usize) -> Option<u32> {
         let is_other = self.mesh.parts.get(part).is_some_and(|p| p.material == Material::Other);
         self.authored.of_parts.get(part).copied().flatten().filter(|_| is_other)
+    }
+
+    /// The authored material that says where skin has holes: index into [`Authored::materials`].
+    pub fn hole_material(&self, part: usize) -> Option<u32> {
+        let is_skin = self.mesh.parts.get(part).is_some_and(|p| p.material == Material::Skin);
+        let material = self.authored.of_parts.get(part).copied().flatten().filter(|_| is_skin)?;
+        self.authored.materials[material as usize].cutoff().map(|_| material)
+    }
+
+    /// The authored material that a part needs to be drawn, whole or for its holes.
+    pub fn needed_material(&self, part: usize) -> Option<u32> {
+        self.authored_material(part).or_else(|| self.hole_material(part))
     }
 }
 
@@ -231,13 +296,27 @@ impl Authored {
                 Err((format!("authored material {:?}, {what}", material.name), found, expected))
             };
             let share = |v: &f32| (0.0..=1.0).contains(v);
-            let shares =
-                [material.metallic, material.roughness, material.occlusion_strength, material.base_color[3]];
+            let shares = [
+                material.metallic,
+                material.roughness,
+                material.occlusion_strength,
+                material.base_color[3],
+                material.specular,
+                material.clearcoat,
+                material.clearcoat_roughness,
+                material.transmission,
+            ];
             if let Some(v) = shares.iter().chain(&material.base_color).find(|v| !share(v)) {
                 return fail("factors", v.to_string(), "0 to 1");
             }
             if let Some(v) = material.emission_linear.iter().find(|v| !v.is_finite() || **v < 0.0) {
                 return fail("emission", v.to_string(), "finite numbers from 0 on");
+            }
+            if let Some(v) = material.specular_color.iter().find(|v| !v.is_finite() || **v < 0.0) {
+                return fail("specular colour", v.to_string(), "finite numbers from 0 on");
+            }
+            if !(material.ior.is_finite() && (material.ior >= 1.0 || material.ior == 0.0)) {
+                return fail("index of refraction", material.ior.to_string(), "1 or more, or 0");
             }
             if !material.normal_scale.is_finite() {
                 return fail("normal scale", material.normal_scale.to_string(), "a finite number");
@@ -319,18 +398,35 @@ mod tests {
         let head = head();
         head.validate().unwrap();
         assert_eq!([0, 1, 2].map(|p| head.authored_material(p)), [Some(0), None, None]);
+        assert_eq!([0, 1, 2].map(|p| head.needed_material(p)), [Some(0), None, None]);
+        // Skin takes no more of it than its holes.
+        let mut cut = head;
+        cut.authored.materials[0].alpha = AlphaMode::Mask { cutoff: 0.5 };
+        assert_eq!([0, 1, 2].map(|p| cut.hole_material(p)), [None, Some(0), None]);
+        assert_eq!(cut.authored_material(1), None);
+    }
+
+    #[test]
+    fn glass_is_see_through_and_reflects_as_its_index_says() {
+        let glass = AuthoredMaterial { transmission: 1.0, ior: 1.5, ..AuthoredMaterial::default() };
+        assert!(glass.is_see_through() && !AuthoredMaterial::default().is_see_through());
+        assert!((glass.dielectric_f0() - 0.04).abs() < 1e-7);
+        assert_eq!(AuthoredMaterial { ior: 0.0, ..glass }.dielectric_f0(), 1.0);
     }
 
     #[test]
     fn what_is_wrong_is_found() {
         type Break = (&'static str, fn(&mut Authored));
-        let breaks: [Break; 10] = [
+        let breaks: [Break; 13] = [
             ("four bytes per texel", |a| a.images[0].width = 2),
             ("four bytes per texel", |a| a.images[0] = AuthoredImage::default()),
             ("0 to 1", |a| a.materials[0].roughness = f32::NAN),
             ("finite numbers from 0 on", |a| a.materials[0].emission_linear[1] = -1.0),
             ("a finite number from 0 on", |a| a.materials[0].alpha = AlphaMode::Mask { cutoff: -1.0 }),
             ("an existing image", |a| a.images.clear()),
+            ("0 to 1", |a| a.materials[0].transmission = 1.5),
+            ("1 or more, or 0", |a| a.materials[0].ior = 0.5),
+            ("finite numbers from 0 on", |a| a.materials[0].specular_color[2] = f32::INFINITY),
             ("set 0 or 1", |a| a.materials[0].base_color_texture.as_mut().unwrap().uv_set = 2),
             ("an existing material", |a| a.of_parts[0] = Some(1)),
             ("at most one per part", |a| a.of_parts.push(None)),

@@ -172,6 +172,10 @@ impl OcclusionChange {
 /// The maps of a head, all in its texture space. Each is optional; a missing map has no effect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SkinMaps {
+    /// Colour that the skin has by itself in the neutral state, make-up, brows and stubble included: linear Rec. 709
+    /// albedo 0 to 1, 3 channels. With it melanin and hemoglobin say no more than how blood moves that colour
+    /// ([`crate::skin::chromophores::SkinLookup::change`]); without it the colour is the look-up's.
+    pub albedo: Option<Map>,
     /// Melanin volume fraction of the epidermis, 0 to 0.5 (Jimenez 2012 table 7.1), 1 channel.
     pub melanin: Option<Map>,
     /// Hemoglobin volume fraction of the dermis in the neutral state, 0 to 0.32, 1 channel: `H_n`.
@@ -343,6 +347,7 @@ impl Head {
 impl SkinMaps {
     fn validate(&self) -> Result<(), (String, String, &'static str)> {
         let named = [
+            ("albedo", &self.albedo, 3),
             ("melanin", &self.melanin, 1),
             ("hemoglobin", &self.hemoglobin, 1),
             ("hemoglobin_mean", &self.hemoglobin_mean, 1),
@@ -355,6 +360,9 @@ impl SkinMaps {
             if let Some(map) = map {
                 map.check(name, channels)?;
             }
+        }
+        if let Some(v) = self.albedo.iter().flat_map(|m| &m.values).find(|v| !(0.0..=1.0).contains(*v)) {
+            return Err(("map albedo".into(), v.to_string(), "reflectances from 0 to 1"));
         }
         for (i, map) in self.wrinkle_slopes.iter().enumerate() {
             map.check(&format!("wrinkle_slopes[{i}]"), 2)?;

@@ -56,8 +56,11 @@ impl Map {
                 self.channels,
                 self.values.len()
             );
-            let expected =
-                if channels == 1 { "a filled map of 1 channel" } else { "a filled map of 2 channels" };
+            let expected = match channels {
+                1 => "a filled map of 1 channel",
+                2 => "a filled map of 2 channels",
+                _ => "a filled map of 3 channels",
+            };
             return Err((format!("map {name}"), found, expected));
         }
         match self.values.iter().position(|v| !v.is_finite()) {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use rubor_assets::convert::own_color;
 use rubor_assets::{check, import, synthesize};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
@@ -35,13 +36,15 @@ pub struct LoadedHead {
     pub notes: Vec<Note>,
 }
 
-/// The head of a file (`.glb`, `.gltf`, `.vrm`, `.obj`, `.usda`, `.usdz`), or the built-in one.
+/// The head of a file (`.glb`, `.gltf`, `.vrm`, `.obj`, `.usda`, `.usdz`), or the built-in one. Textured skin of other
+/// programs keeps its colour ([`keep_color`]).
 ///
 /// # Errors
 /// A file that is missing or that is no head.
 pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
-    let mut loaded = head_of_any_size(path)?;
+    let mut loaded = plain_head(path)?;
     let about = path.unwrap_or(Path::new("built-in head")).display().to_string();
+    loaded.notes.extend(keep_color(&mut loaded.head, &about, &own_color::Options::default())?);
     loaded.notes.extend(check::head::size(&loaded.head).map(|f| {
         let fix = f.fix.map(|fix| format!("; {fix}")).unwrap_or_default();
         Note::new(about.as_str(), f.message + &fix)
@@ -49,11 +52,20 @@ pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
     Ok(loaded)
 }
 
-/// As [`head`], without a word about its size.
+/// Textured skin of other programs becomes skin of its own colour, with notes about `name`.
+///
+/// # Errors
+/// Options out of range.
+pub fn keep_color(head: &mut Head, name: &str, options: &own_color::Options) -> Outcome<Vec<Note>> {
+    let notes = own_color::adopt(head, options)?;
+    Ok(notes.iter().map(|n| Note::new(name, n.to_string())).collect())
+}
+
+/// As [`head`], with the materials of other programs as they came, and without a word about its size.
 ///
 /// # Errors
 /// As [`head`].
-pub fn head_of_any_size(path: Option<&Path>) -> Outcome<LoadedHead> {
+pub fn plain_head(path: Option<&Path>) -> Outcome<LoadedHead> {
     let name = path.unwrap_or(Path::new("built-in head"));
     let bytes = match path {
         None => std::borrow::Cow::Borrowed(DEFAULT_HEAD),

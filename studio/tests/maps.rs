@@ -364,8 +364,11 @@ fn an_albedo_texture_becomes_chromophores_of_a_head() {
     for (file, into) in [(&linear, &bare), (&encoded, &with_blush)] {
         let out = folder.path("out.glb");
         let report = done(&["chromophores", file, "--into", into, "-o", &out]);
-        assert_eq!(report["out_of_gamut_texels"], 0);
+        assert_eq!((&report["out_of_gamut_texels"], report["exposure"]["gain"].as_f64()), (&0.into(), Some(1.0)));
         let found = read(&out);
+        let own = found.maps.albedo.as_ref().expect("the colour stays");
+        let expected = skin.color(0.05, 0.012);
+        assert!((0..3).all(|c| (f64::from(own.sample(0.3, 0.5, c as u32)) - expected[c]).abs() < 4e-3));
         let at = |m: &Option<Map>, u: f32| m.as_ref().expect("a map").sample(u, 0.5, 0);
         assert!((at(&found.maps.melanin, 0.3) - 0.05).abs() < 1e-3);
         let (left, right) = (at(&found.maps.hemoglobin, 0.3), at(&found.maps.hemoglobin, 0.7));
@@ -377,6 +380,9 @@ fn an_albedo_texture_becomes_chromophores_of_a_head() {
             assert!((blush.bias.sample(0.3, 0.5, 0) - 0.018).abs() < 1e-3, "the blush follows the blood");
         }
     }
+    let out = folder.path("colourless.glb");
+    done(&["chromophores", &linear, "--into", &bare, "-o", &out, "--no-color", "--gain", "0.8"]);
+    assert!(read(&out).maps.albedo.is_none());
     let elsewhere = Map {
         channels: 3,
         values: (0..96 * 96).flat_map(|i| [if i % 96 < 8 { 0.4 } else { 0.0 }; 3]).collect(),

@@ -12,6 +12,7 @@ use super::ConvertError;
 use super::hemoglobin::{HemoglobinMaps, default_radius};
 use super::skin_texels::SkinTexels;
 use super::transfer::{BiasTransfer, Warp, transfer};
+use crate::synthesize::strands::hide_brows;
 
 /// Where maps come from, for the provenance of a head.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -84,6 +85,23 @@ pub fn put_chromophores(
     head.maps.hemoglobin = Some(hemoglobin);
     origin.stamp(head, "melanin");
     origin.stamp(head, "hemoglobin");
+    Ok(())
+}
+
+/// Puts a linear Rec. 709 albedo of 3 channels into a head as the colour that its skin has by itself. Hair that was to be
+/// drawn with the skin goes, and brows that were grown are hidden: that colour has its own.
+///
+/// # Errors
+/// Other channels.
+pub fn put_albedo(head: &mut Head, albedo: Map, origin: &Origin) -> Result<(), ConvertError> {
+    if albedo.channels != 3 {
+        return Err(ConvertError::argument("albedo", format!("{} channels", albedo.channels), "3"));
+    }
+    let values = albedo.values.iter().map(|v| v.clamp(0.0, 1.0)).collect();
+    head.maps.albedo = Some(Map { values, ..albedo });
+    head.maps.hair = None;
+    hide_brows(head);
+    origin.stamp(head, "albedo");
     Ok(())
 }
 
@@ -221,6 +239,7 @@ mod tests {
     use super::super::skin_texels::tests::sheet;
     use super::*;
     use glam::Vec2;
+    use rubor_rig::head::Material;
     use rubor_rig::mask::Mask;
 
     fn origin() -> Origin {
@@ -273,6 +292,19 @@ mod tests {
         let mean = head.maps.hemoglobin_mean.as_ref().unwrap();
         assert_eq!((mean.width, mean.values[9]), (8, 0.01));
         assert!((head.maps.distributions[0].bias.values[5] - 0.015).abs() < 1e-7);
+    }
+
+    #[test]
+    fn a_colour_of_its_own_has_its_own_hair() {
+        let mut head = head();
+        head.maps.hair = Some(Map::filled(4, 4, &[1.0]));
+        let brows = rubor_rig::head::Part { name: "brows".into(), material: Material::Hair, triangles: 2..2 };
+        head.mesh.parts.push(brows);
+        put_albedo(&mut head, Map::filled(4, 4, &[1.2, 0.5, -0.1]), &origin()).unwrap();
+        assert!(head.validate().is_ok() && head.maps.hair.is_none());
+        assert_eq!(head.mesh.parts[1].material, Material::Hidden);
+        assert_eq!(head.maps.albedo.as_ref().unwrap().values[..3], [1.0, 0.5, 0.0]);
+        assert!(put_albedo(&mut head, Map::filled(4, 4, &[1.0]), &origin()).is_err());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! ```text
 //! hemoglobin maps --hemoglobin----> neutral map, its mean, scale and bias of every expression
 //! albedo texture  --chromophores--> melanin and hemoglobin maps, residual, out-of-gamut mask
+//! authored skin   --own_color-----> albedo, chromophores, slopes and gloss of skin that keeps its look
 //! normal map      --normals-------> slopes, difference maps, and back
 //! displacement    --displacement--> slopes of what it raises, alone or finer than a normal map
 //! another head    --transfer------> its distributions on this head's own blood
@@ -21,6 +22,7 @@ pub mod hemoglobin;
 pub mod into_head;
 pub mod normals;
 pub mod occlusion;
+pub mod own_color;
 pub mod prediction;
 pub mod size;
 pub mod skin_texels;

@@ -1,7 +1,7 @@
 use rubor_rig::color::{ciede2000, lab_from_rec709, srgb_encode};
 use rubor_rig::map::Map;
 use rubor_rig::mask::Mask;
-use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
+use rubor_rig::skin::chromophores::{ChromophoreModel, SkinLookup, SkinModel};
 
 use super::{chromophores, hemoglobin, normals};
 use crate::image_io::{LoadedImage, SampleKind, load_image, save_image};
@@ -99,8 +99,9 @@ fn albedo_goes_to_chromophores_and_back() {
         kind: SampleKind::U8,
         notes: Vec::new(),
     };
-    let read = chromophores::linear_albedo(&image, chromophores::AlbedoEncoding::Automatic, 1.0).unwrap();
-    let found = chromophores::convert(&read, &image.mask(), &lookup, 3.0).unwrap();
+    let read = chromophores::linear_albedo(&image, chromophores::AlbedoEncoding::Automatic).unwrap();
+    let given = chromophores::Options { gain: Some(1.0), ..Default::default() };
+    let found = chromophores::convert(&read, &image.mask(), &lookup, &given).unwrap();
     assert_eq!(found.summary.out_of_gamut_texels, 0);
     let back = chromophores::albedo(&found.melanin, &found.hemoglobin, &lookup).unwrap();
     let lab = |c: &[f32]| lab_from_rec709([c[0], c[1], c[2]].map(f64::from));
@@ -131,15 +132,69 @@ fn texels_that_are_no_skin_are_marked_and_holes_filled() {
     albedo.values[..3].fill(0.0);
     let mut mask = Mask::full(8, 8);
     mask.mapped[0] = false;
-    let found = chromophores::convert(&albedo, &mask, &lookup, 3.0).unwrap();
+    let options = chromophores::Options::default();
+    let found = chromophores::convert(&albedo, &mask, &lookup, &options).unwrap();
     assert_eq!(found.out_of_gamut.count(), 1);
     assert!(found.out_of_gamut.mapped[9] && found.residual.values[9] > 20.0);
-    // The marked texel has the blood of the skin around it.
-    assert!((found.hemoglobin.values[9] - 0.015).abs() < 1e-3, "{}", found.hemoglobin.values[9]);
-    assert!((found.melanin.values[0] - 0.02).abs() < 0.02, "{}", found.melanin.values[0]);
+    // The marked texel has the blood and the pigment of the skin around it, as the hole has.
+    for i in [0, 9] {
+        assert!((found.hemoglobin.values[i] - 0.015).abs() < 1e-3, "{}", found.hemoglobin.values[i]);
+        assert!((found.melanin.values[i] - 0.02).abs() < 1e-3, "{}", found.melanin.values[i]);
+    }
     assert!((found.melanin.values[20] - 0.02).abs() < 1e-4);
-    assert!(chromophores::convert(&albedo, &Mask::full(3, 3), &lookup, 3.0).is_err());
-    assert!(chromophores::convert(&Map::filled(8, 8, &[0.1]), &mask, &lookup, 3.0).is_err());
+    assert!(chromophores::convert(&albedo, &Mask::full(3, 3), &lookup, &options).is_err());
+    assert!(chromophores::convert(&Map::filled(8, 8, &[0.1]), &mask, &lookup, &options).is_err());
+}
+
+/// Skin of varied melanin and blood times a factor, as a camera that is not calibrated gives it.
+fn exposed(lookup: &SkinLookup, factor: f32) -> Map {
+    let value = |i: u32| lookup.sample(0.006 + 0.002 * (i % 9) as f32, 0.008 + 0.003 * (i / 24 % 7) as f32);
+    let values = (0..24 * 24).flat_map(|i| value(i).map(|c| factor * c)).collect();
+    Map { width: 24, height: 24, channels: 3, values }
+}
+
+#[test]
+fn the_exposure_of_a_picture_is_found_and_its_confidence_said() {
+    let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
+    let full = Mask::full(24, 24);
+    let threshold = chromophores::DEFAULT_GAMUT_THRESHOLD;
+    let true_one = chromophores::estimate_exposure(&exposed(&lookup, 1.0), &full, &lookup, threshold);
+    assert_eq!(true_one.gain, 1.0);
+    let bright = chromophores::estimate_exposure(&exposed(&lookup, 1.45), &full, &lookup, threshold);
+    assert!((1.45 * bright.gain - 1.0).abs() < 0.1 && bright.range[1] < 1.0, "{bright}");
+    // The cast of a warm lamp is found where no gain alone makes it skin.
+    let mut warm = exposed(&lookup, 1.0);
+    warm.values.chunks_exact_mut(3).for_each(|c| c[2] *= 0.8);
+    let warm = chromophores::estimate_exposure(&warm, &full, &lookup, threshold);
+    assert!(warm.balance[2] > 1.1 * warm.balance[0], "{warm}");
+    assert_eq!((true_one.balance, bright.balance), ([1.0; 3], [1.0; 3]));
+    // A green picture has no exposure at which it is skin.
+    let green = Map::filled(24, 24, &[0.1, 0.6, 0.1]);
+    let none = chromophores::estimate_exposure(&green, &full, &lookup, threshold);
+    assert!(none.confidence < 0.05 && bright.confidence > 2.0 * none.confidence + 0.3, "{none}; {bright}");
+    // A given gain is taken as it is; the wrong ones are refused.
+    let options = |gain| chromophores::Options { gain: Some(gain), ..Default::default() };
+    let given = chromophores::convert(&green, &full, &lookup, &options(0.5)).unwrap().exposure;
+    assert_eq!((given.gain, given.confidence), (0.5, 1.0));
+    for wrong in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        assert!(chromophores::convert(&green, &full, &lookup, &options(wrong)).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+fn painted_skin_has_the_blood_of_a_face_everywhere() {
+    let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
+    // Rosy flat paint, with blue eyelids.
+    let values = (0..32 * 32).flat_map(|i| if i % 32 < 4 { [0.1, 0.2, 0.9] } else { [0.95, 0.30, 0.75] });
+    let albedo = Map { width: 32, height: 32, channels: 3, values: values.collect() };
+    let found =
+        chromophores::convert(&albedo, &Mask::full(32, 32), &lookup, &chromophores::Options::default())
+            .unwrap();
+    assert!(found.summary.is_painted && found.exposure.confidence < 0.1, "{:?}", found.summary);
+    let blood = found.hemoglobin.values[0];
+    assert!((0.01..=0.035).contains(&blood), "{blood}");
+    assert!(found.hemoglobin.values.iter().all(|h| *h == blood));
+    assert!(found.melanin.values.iter().all(|m| *m == found.melanin.values[0]));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder};
+use rubor_rig::color::srgb_encode;
 use rubor_rig::map::Map;
 
 use crate::error::ExportError;
@@ -117,6 +118,26 @@ pub(crate) fn encode_map(what: &str, map: &Map, encoding: MapEncoding) -> Result
     };
     let layout = if channels == 1 { ChannelLayout::First } else { ChannelLayout::Stacked };
     Ok(EncodedMap { bytes, mime_type, layout, offset, scale })
+}
+
+/// Encodes a map of linear Rec. 709 colours from 0 to 1 in 8 bits of sRGB.
+pub(crate) fn encode_colors(
+    what: &str,
+    map: &Map,
+    encoding: MapEncoding,
+) -> Result<EncodedMap, ExportError> {
+    let texels: Vec<u8> =
+        map.values.iter().map(|v| (srgb_encode(v.clamp(0.0, 1.0)) * 255.0).round() as u8).collect();
+    let (width, height) = (map.width, map.height);
+    let (bytes, mime_type) = match encoding {
+        MapEncoding::Png8 | MapEncoding::Png16 => {
+            (encode_png(what, &texels, width, height, ExtendedColorType::Rgb8)?, "image/png")
+        }
+        MapEncoding::Jpeg(quality) => {
+            (encode_jpeg(what, &texels, width, height, ExtendedColorType::Rgb8, quality)?, "image/jpeg")
+        }
+    };
+    Ok(EncodedMap { bytes, mime_type, layout: ChannelLayout::Color, offset: vec![0.0; 3], scale: vec![1.0; 3] })
 }
 
 fn range(map: &Map, channel: usize) -> (f32, f32) {

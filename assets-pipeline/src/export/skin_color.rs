@@ -26,7 +26,7 @@ const LEAST_CHANGE: f32 = 0.5 / 255.0;
 const RIDGE: f64 = 1e-3;
 
 /// True for a head whose skin has a colour of its own.
-fn has_skin_color(head: &Head) -> bool {
+pub(super) fn has_skin_color(head: &Head) -> bool {
     head.maps.melanin.is_some()
         && head.maps.hemoglobin.is_some()
         && head.mesh.parts.iter().any(|p| p.material == Material::Skin)
@@ -56,12 +56,19 @@ pub fn bake(head: &Head, face: Option<&FaceState>, side: u32, factor: f32) -> Op
     });
     let hemoglobin = blended.as_ref().unwrap_or(neutral);
     let lookup = table();
-    let side = melanin.width.max(hemoglobin.width).min(side);
+    let own = maps.albedo.as_ref();
+    let side = melanin.width.max(hemoglobin.width).max(own.map_or(0, |m| m.width)).min(side);
     let row = |y: u32| -> Vec<u8> {
         (0..side)
             .flat_map(|x| {
                 let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
-                let skin = lookup.sample(melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));
+                let (m, h) = (melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));
+                let skin = match own {
+                    Some(own) => {
+                        lookup.with_blood([0, 1, 2].map(|c| own.sample(u, v, c)), m, neutral.sample(u, v, 0), h)
+                    }
+                    None => lookup.sample(m, h),
+                };
                 let hair = maps.hair.as_ref().map_or(0.0, |h| hidden_by_hair(h.sample(u, v, 0)));
                 let rgb: [f32; 3] = std::array::from_fn(|c| {
                     (skin[c] + hair * (maps.hair_color_linear[c] - skin[c])) * (1.0 - 0.3 * hair)

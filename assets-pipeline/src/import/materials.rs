@@ -3,7 +3,7 @@
 use rubor_rig::head::Material;
 
 /// Words in names (lower case) and what they mean; the first that occurs wins, so special ones stand first.
-const WORDS: [(&str, Material); 46] = [
+const WORDS: [(&str, Material); 48] = [
     ("glasses", Material::Other),
     ("eyewear", Material::Other),
     ("headwear", Material::Other),
@@ -17,6 +17,9 @@ const WORDS: [(&str, Material); 46] = [
     ("cloth", Material::Other),
     ("helmet", Material::Other),
     ("hairband", Material::Other),
+    // A line painted around the eye, and what stands before a face.
+    ("eyeline", Material::Other),
+    ("mask", Material::Other),
     ("eyeocclusion", Material::Hidden),
     ("eye_occlusion", Material::Hidden),
     ("occlusion", Material::Hidden),
@@ -82,6 +85,13 @@ mod tests {
             ("M_EyeLashes", Material::Lash),
             ("eyeball_L", Material::Eye),
             ("Wolf3D_Glasses", Material::Other),
+            ("Wolf3D_Skin", Material::Skin),
+            ("Wolf3D_Body", Material::Skin),
+            ("avaturn_body_material", Material::Skin),
+            ("N00_000_00_Face_00_SKIN (Instance)", Material::Skin),
+            ("N00_000_00_Body_00_SKIN (Instance)", Material::Skin),
+            ("N00_000_00_FaceEyeline_00_FACE (Instance)", Material::Other),
+            ("N00_000_00_FaceBrow_00_FACE (Instance)", Material::Hair),
             ("Material.001", Material::Skin),
         ] {
             assert_eq!(guess_material(name), material, "{name}");

@@ -13,6 +13,7 @@ use rubor_rig::hemoglobin::{self, HemoglobinError};
 use rubor_rig::map::Map;
 use rubor_rig::mask::Mask;
 
+use super::face_space::canonical_landmarks;
 use super::noise::{Stream, noise};
 use super::regions::Regions;
 use super::surface::{Coverage, Site};
@@ -186,6 +187,17 @@ fn response(state: &State, index: usize, side: f32, place: Vec3, r: &Regions, se
     let change = (state.change)(r) * (1.0 + side * lateral) * (1.0 + 0.14 * own) + state.everywhere;
     let rise = (change / 0.5).clamp(0.0, 1.0);
     ((1.0 + state.strength * change).max(0.25), 1.0 + (state.patchiness - 1.0) * rise)
+}
+
+/// Every state where the place of the face is not known: its name, and the factor of the mean hemoglobin that it has on
+/// average over the landmarks of the canonical face.
+pub(crate) fn mean_factors() -> Vec<(&'static str, f32)> {
+    let regions: Vec<Regions> = canonical_landmarks().map(Regions::at).collect();
+    let mean = |state: &State| {
+        let changes: f32 = regions.iter().map(|r| (state.change)(r)).sum();
+        1.0 + state.strength * (changes / regions.len() as f32 + state.everywhere)
+    };
+    STATES.iter().map(|state| (state.name, mean(state).max(0.25))).collect()
 }
 
 /// Place, regions, mean and value of the neutral map at a texel.

@@ -80,6 +80,13 @@ pub(crate) fn canonical(name: &str) -> Vec3 {
     Vec3::from_array(found.expect("a landmark of the canonical face").1)
 }
 
+/// All landmarks of the canonical face, both sides, mm.
+pub(crate) fn canonical_landmarks() -> impl Iterator<Item = Vec3> {
+    let middle = MIDDLE.iter().map(|(_, place)| Vec3::from_array(*place));
+    let left = PAIRED.iter().map(|(_, place)| Vec3::from_array(*place));
+    middle.chain(left.flat_map(|p| [p, p * Vec3::new(-1.0, 1.0, 1.0)]))
+}
+
 /// A position on the face unrolled about the vertical axis: arc length to the left of the middle, and height, mm.
 pub(crate) fn plan(c: Vec3) -> Vec2 {
     Vec2::new(PLAN_RADIUS_MM * c.x.atan2(c.z), c.y)

@@ -22,13 +22,15 @@ mod noise;
 mod regions;
 mod relief;
 mod specular;
-mod strands;
+pub(crate) mod strands;
 mod surface;
 #[cfg(test)]
 mod tests;
 mod wrinkles;
 
-use rubor_rig::head::{Head, Provenance, ProvenanceKind, SkinMaps, WrinkleZone};
+use rubor_rig::head::{Distribution, Head, Provenance, ProvenanceKind, SkinMaps, WrinkleZone};
+use rubor_rig::hemoglobin;
+use rubor_rig::map::Map;
 use rubor_rig::skin::chromophores::{MAX_HEMOGLOBIN, MAX_MELANIN};
 use thiserror::Error;
 
@@ -40,6 +42,10 @@ use relief::Relief;
 pub use strands::grow_lashes;
 use surface::SkinSurface;
 use wrinkles::Wrinkles;
+
+use crate::convert::hemoglobin::default_radius;
+use crate::convert::skin_texels::SkinTexels;
+use crate::convert::transfer::{BiasTransfer, Warp, transfer};
 
 /// Side of the maps of hemoglobin distributions, texels (Jimenez 2012 section 7.6).
 pub const DISTRIBUTION_RESOLUTION: u32 = 256;
@@ -268,6 +274,7 @@ fn synthesize_with(
         .map(|(mask, name)| WrinkleZone { name: name.into(), wrinkle_map: 0, mask })
         .collect();
     Ok(SkinMaps {
+        albedo: None,
         melanin,
         hemoglobin,
         hemoglobin_mean: Some(hemoglobin_mean),
@@ -325,12 +332,64 @@ pub fn provenance(options: &Options) -> Vec<Provenance> {
         .collect()
 }
 
-/// Makes all maps of a head and puts them into it, replacing maps and their provenance, and grows brows as geometry.
+/// Makes all maps of a head and puts them into it, replacing maps and their provenance, and grows brows as geometry. A head
+/// whose skin has a colour by itself keeps the maps that it has and gets those that it lacks.
 ///
 /// # Errors
 /// As [`synthesize`]; the head is then unchanged.
 pub fn synthesize_into(head: &mut Head, options: &Options) -> Result<(), SynthesizeError> {
     synthesize_into_with(head, options, &|| ())
+}
+
+/// Gives skin that has a colour by itself what it lacks: distributions, and where landmarks say where the face is wrinkles
+/// and relief. Its own maps stay; no hair is made, as its colour holds it.
+fn complete(
+    head: &mut Head,
+    options: &Options,
+    step: &(dyn Fn() + Sync),
+) -> Result<(), SynthesizeError> {
+    options.check()?;
+    let own = head.maps.clone();
+    let Some(blood) = &own.hemoglobin else { return Ok(()) };
+    let size = DISTRIBUTION_RESOLUTION;
+    let mask = SkinTexels::new(head, blood.width, blood.height).mask();
+    let radius_px = default_radius(blood);
+    let mean = hemoglobin::neutral(blood, &mask, radius_px, size)?.mean;
+    let mut made = vec!["distributions"];
+    if finds_face(head) {
+        let without_hair = Options { brows: 0.0, stubble: 0.0, scalp_hair: 0.0, ..options.clone() };
+        let from = synthesize_with(head, &without_hair, step)?;
+        // Only relative changes belong to an expression (Jimenez 2012 section 7.4.2).
+        let followed = |d: &Distribution| match &from.hemoglobin_mean {
+            Some(old) => transfer(d, old, &mean, &Warp::Identity, BiasTransfer::Ratio).ok(),
+            None => None,
+        };
+        head.maps.distributions = from.distributions.iter().filter_map(followed).collect();
+        head.maps.wrinkle_slopes = from.wrinkle_slopes;
+        head.maps.zones = from.zones;
+        made.extend(["wrinkle_slopes", "zones"]);
+        if own.slopes.is_none() {
+            head.maps.slopes = from.slopes;
+            made.push("slopes");
+        }
+        if own.scattering.is_none() {
+            head.maps.scattering = from.scattering;
+            made.push("scattering");
+        }
+    } else {
+        let distribution = |(name, factor): (&str, f32)| Distribution {
+            name: name.into(),
+            scale: Map::filled(size, size, &[1.0]),
+            bias: Map { values: mean.values.iter().map(|v| factor * v).collect(), ..mean },
+        };
+        head.maps.distributions = expressions::mean_factors().into_iter().map(distribution).collect();
+        (0..options.steps()).for_each(|_| step());
+    }
+    head.maps.hemoglobin_mean = Some(mean.clone());
+    let stamps = provenance(options).into_iter().filter(|p| made.iter().any(|m| p.of == format!("maps.{m}")));
+    head.provenance.retain(|p| !made.iter().any(|m| p.of == format!("maps.{m}")));
+    head.provenance.extend(stamps);
+    Ok(())
 }
 
 /// As [`synthesize_into`]; calls `step` [`Options::steps`] times on the way, from several threads.
@@ -342,6 +401,9 @@ pub fn synthesize_into_with(
     options: &Options,
     step: &(dyn Fn() + Sync),
 ) -> Result<(), SynthesizeError> {
+    if head.maps.albedo.is_some() {
+        return complete(head, options, step);
+    }
     head.maps = synthesize_with(head, options, step)?;
     strands::grow_brows(head, options);
     head.provenance.retain(|p| !p.of.starts_with("maps."));

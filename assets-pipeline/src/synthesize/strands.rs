@@ -67,6 +67,12 @@ struct Strand {
     knots: Vec<(Anchor, Vec3)>,
 }
 
+/// Brows that were grown are drawn no more: the colour of the skin holds its own.
+pub(crate) fn hide_brows(head: &mut Head) {
+    let grown = head.mesh.parts.iter_mut().filter(|p| p.name == BROWS && p.material == Material::Hair);
+    grown.for_each(|p| p.material = Material::Hidden);
+}
+
 /// Puts brows of hair on the skin in place of earlier ones. A head without landmarks gets none: their place would be a
 /// guess.
 pub(super) fn grow_brows(head: &mut Head, options: &Options) {

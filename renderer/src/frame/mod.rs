@@ -30,6 +30,7 @@ use crate::passes::hair::cropped_hair::CroppedHair;
 use crate::passes::hair::fibre::Fibre;
 use crate::passes::hair::overlay::Overlay;
 use crate::passes::resolve::Resolve;
+use crate::passes::see_through::SeeThrough;
 use crate::passes::shade::{Shade, Transmittance};
 use crate::scene::{Light, MAX_LIGHTS, PosedHead, Scene};
 use crate::settings::{Settings, ToneMap, TransmitMethod};
@@ -48,6 +49,7 @@ pub(crate) struct Passes {
     pub(crate) fibre: Fibre,
     pub(crate) cropped_hair: CroppedHair,
     pub(crate) overlay: Overlay,
+    pub(crate) see_through: SeeThrough,
     pub(crate) tone_map: ToneMap,
     pub(crate) resolve: Resolve,
     pub(crate) display: Display,
@@ -102,6 +104,7 @@ impl Passes {
             fibre: Fibre::new(gpu),
             cropped_hair: CroppedHair::new(gpu, rasteriser),
             overlay: Overlay::new(gpu, rasteriser),
+            see_through: SeeThrough::default(),
             tone_map,
             resolve: Resolve::new(gpu, tone_map),
             display: Display::new(gpu, tone_map),

@@ -100,7 +100,7 @@ impl<'a> Frame<'a> {
         self.passes.shade.record(r, &lighting, &self.heads, samples.lit.as_ref())
     }
 
-    /// From the light of a sample to display values: compose, hair and films, resolve, display.
+    /// From the light of a sample to display values: compose, hair and films, what is seen through, resolve, display.
     pub(crate) fn show(
         &mut self,
         r: &mut Recorder<'_>,
@@ -120,6 +120,9 @@ impl<'a> Frame<'a> {
         passes.cropped_hair.record(r, hair, &seen, &self.heads, &hdr, velocity.as_ref());
         let ambient = average_light(self.scene);
         passes.overlay.record(r, hair, ambient, &seen, &self.heads, &hdr, velocity.as_ref());
+        let lighting =
+            Lighting { light, seen: &seen, first: None, transmittance: None, quality: &self.settings.quality };
+        let hdr = passes.see_through.record(r, &passes.shade, &lighting, &self.heads, hdr);
 
         self.keep([
             (Channel::Radiance, &hdr),

@@ -8,6 +8,7 @@ pub(crate) mod display;
 pub(crate) mod geometry;
 pub(crate) mod hair;
 pub(crate) mod resolve;
+pub(crate) mod see_through;
 pub(crate) mod shade;
 
 /// Workgroups of a pass whose invocations compute the pixels of blocks.wesl, for an image of a size.

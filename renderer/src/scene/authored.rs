@@ -7,7 +7,9 @@ use std::collections::HashMap;
 
 use half::f16;
 use rayon::prelude::*;
-use rubor_rig::authored::{Authored, AuthoredImage, AuthoredMaterial, AuthoredTexture, Wrap};
+use rubor_rig::authored::{
+    AlphaMode, Authored, AuthoredImage, AuthoredMaterial, AuthoredTexture, TEXTURES, Wrap,
+};
 use rubor_rig::color::srgb_decode;
 use rubor_rig::head::Head;
 
@@ -20,6 +22,10 @@ use crate::error::RenderError;
 const MAX_SIDE: u32 = 2048;
 /// Bytes of the first levels of an array.
 const MAX_BYTES: u64 = 256 << 20;
+/// Blended parts are opaque from this alpha on: they go through the visibility buffer there.
+pub(crate) const OPAQUE_ALPHA: f32 = 0.99;
+/// More than any alpha.
+const NEVER: f32 = 2.0;
 /// Layers of an array that every device has (WebGPU's default limit).
 const MAX_LAYERS: usize = 256;
 
@@ -39,8 +45,11 @@ pub(crate) struct GpuMaterial {
     pub(crate) base_color: [f32; 4],
     pub(crate) emission: [f32; 4],
     pub(crate) factors: [f32; 4],
+    pub(crate) coats: [f32; 4],
+    pub(crate) tint: [f32; 4],
+    pub(crate) cutoffs: [f32; 4],
     pub(crate) flags: [u32; 4],
-    pub(crate) textures: [GpuTexture; 5],
+    pub(crate) textures: [GpuTexture; TEXTURES],
 }
 
 /// What only these materials read of a vertex.
@@ -112,7 +121,7 @@ impl Layers {
 impl AuthoredOnGpu {
     /// Uploads the materials of a head; `None` where no part is drawn with one.
     pub(crate) fn new(gpu: &Gpu, head: &Head) -> Result<Option<Self>, RenderError> {
-        let drawn: Vec<u32> = (0..head.mesh.parts.len()).filter_map(|p| head.authored_material(p)).collect();
+        let drawn: Vec<u32> = (0..head.mesh.parts.len()).filter_map(|p| head.needed_material(p)).collect();
         if drawn.is_empty() {
             return Ok(None);
         }
@@ -120,9 +129,13 @@ impl AuthoredOnGpu {
         let (mut colors, mut data) = (Layers::default(), Layers::default());
         let materials: Vec<GpuMaterial> = (authored.materials.iter().enumerate())
             .map(|(i, material)| match drawn.contains(&(i as u32)) {
-                true => gpu_material(material, &mut colors, &mut data),
+                true => {
+                    let is_skin = (0..head.mesh.parts.len()).any(|p| head.hole_material(p) == Some(i as u32));
+                    gpu_material(material, is_skin, &mut colors, &mut data)
+                }
                 false => {
-                    gpu_material(&AuthoredMaterial::default(), &mut Layers::default(), &mut Layers::default())
+                    let none = (&mut Layers::default(), &mut Layers::default());
+                    gpu_material(&AuthoredMaterial::default(), false, none.0, none.1)
                 }
             })
             .collect();
@@ -165,23 +178,55 @@ fn gpu_vertex(authored: &Authored, vertex: u32) -> GpuAuthoredVertex {
     GpuAuthoredVertex { u: uv.x, v: uv.y, red_green: [r, g], blue_alpha: [b, a] }
 }
 
-fn gpu_material(material: &AuthoredMaterial, colors: &mut Layers, data: &mut Layers) -> GpuMaterial {
-    let [base, metallic_roughness, normal, occlusion, emission] =
-        material.textures().map(|(_, texture)| texture);
-    let layers = [
-        colors.of(base),
-        data.of(metallic_roughness),
-        data.of(normal),
-        data.of(occlusion),
-        colors.of(emission),
-    ];
+/// `is_skin`: only its holes are drawn.
+fn gpu_material(
+    material: &AuthoredMaterial,
+    is_skin: bool,
+    colors: &mut Layers,
+    data: &mut Layers,
+) -> GpuMaterial {
+    let textures = material.textures().map(|(_, texture)| texture);
+    // Pictures that nothing reads take no memory.
+    let is_read = |i: usize| match i {
+        0 => true,
+        _ if is_skin || material.is_unlit => false,
+        7 | 8 => material.clearcoat > 0.0,
+        9 => material.transmission > 0.0,
+        _ => true,
+    };
+    let layers: [i32; TEXTURES] = std::array::from_fn(|i| {
+        let of = if [0, 4, 6].contains(&i) { &mut *colors } else { &mut *data };
+        of.of(textures[i].filter(|_| is_read(i)))
+    });
     let [r, g, b] = material.emission_linear;
+    let [tint_r, tint_g, tint_b] = material.specular_color;
+    let for_lamps = material.cutoff().unwrap_or(0.0);
+    let cutoffs = match material.alpha {
+        _ if is_skin => [for_lamps; 2],
+        // Glass is dark for no lamp.
+        _ if material.transmission > 0.0 => [NEVER; 2],
+        AlphaMode::Blend => [for_lamps, OPAQUE_ALPHA],
+        AlphaMode::Opaque | AlphaMode::Mask { .. } => [for_lamps; 2],
+    };
+    let flags = [
+        material.is_unlit,
+        material.is_double_sided || is_skin,
+        material.alpha == AlphaMode::Blend && !is_skin,
+    ];
     GpuMaterial {
         base_color: material.base_color,
-        emission: [r, g, b, material.cutoff().unwrap_or(0.0)],
+        emission: [r, g, b, 0.0],
         factors: [material.metallic, material.roughness, material.normal_scale, material.occlusion_strength],
-        flags: [u32::from(material.is_unlit), 0, 0, 0],
-        textures: std::array::from_fn(|i| gpu_texture(material.textures()[i].1, layers[i])),
+        coats: [
+            material.dielectric_f0(),
+            material.specular,
+            material.clearcoat,
+            material.clearcoat_roughness,
+        ],
+        tint: [tint_r, tint_g, tint_b, material.transmission],
+        cutoffs: [cutoffs[0], cutoffs[1], 0.0, 0.0],
+        flags: [flags.iter().enumerate().map(|(bit, is)| u32::from(*is) << bit).sum(), 0, 0, 0],
+        textures: std::array::from_fn(|i| gpu_texture(textures[i].filter(|_| layers[i] >= 0), layers[i])),
     }
 }
 

@@ -45,6 +45,8 @@ struct Storage {
 }
 
 const COLOR: Storage = Storage { format: "rgba8unorm", texel_bytes: 4, block_format: "BC7", block_bytes: 16 };
+const ALBEDO: Storage =
+    Storage { format: "rgba8unorm-srgb", texel_bytes: 4, block_format: "BC7", block_bytes: 16 };
 const GLOSS: Storage = Storage { format: "rg8unorm", texel_bytes: 2, block_format: "BC5", block_bytes: 16 };
 const SLOPES: Storage =
     Storage { format: "rgba16float", texel_bytes: 8, block_format: "BC5 + BC4", block_bytes: 24 };
@@ -62,8 +64,14 @@ pub fn of_maps(maps: &SkinMaps) -> Vec<Footprint> {
     let count = |n: usize| (n as u32).max(1);
     vec![
         entry("chromophores", largest_of(skin.into_iter().flatten()), 1, true, &COLOR),
-        entry("specular", largest_of(maps.specular.iter()), 1, true, &GLOSS),
-        entry("slopes", largest_of(maps.slopes.iter()), 1, true, &SLOPES),
+        match &maps.albedo {
+            // Roughness shares the texture of the slopes.
+            Some(_) => {
+                entry("albedo, specular", largest_of(maps.albedo.iter().chain(&maps.specular)), 1, true, &ALBEDO)
+            }
+            None => entry("specular", largest_of(maps.specular.iter()), 1, true, &GLOSS),
+        },
+        entry("slopes", slope_size(maps), 1, true, &SLOPES),
         entry(
             "wrinkles",
             largest_of(maps.wrinkle_slopes.iter()),
@@ -75,6 +83,12 @@ pub fn of_maps(maps: &SkinMaps) -> Vec<Footprint> {
         entry("neutral mean", side, 1, false, &MEAN),
         entry("zone masks", mask_size(maps), count(maps.zones.len().div_ceil(4)), false, &COLOR),
     ]
+}
+
+/// Texels of the texture of slopes, which holds the roughness of skin that has a colour by itself.
+pub(crate) fn slope_size(maps: &SkinMaps) -> [u32; 2] {
+    let roughness = maps.specular.iter().filter(|_| maps.albedo.is_some());
+    largest_of(maps.slopes.iter().chain(roughness))
 }
 
 /// Texels of the textures of zone masks: their own, which is little (64 x 64 in Jimenez 2012 section 8.3).

@@ -11,7 +11,7 @@ use wgpu::util::DeviceExt;
 
 use super::authored::AuthoredOnGpu;
 use super::clusters::{Cluster, clusters};
-use super::footprint::{APPEARANCE_SIZE, largest_of, mask_size};
+use super::footprint::{APPEARANCE_SIZE, largest_of, mask_size, slope_size};
 use super::hair_roots::roots;
 use crate::device::kernel::Resource;
 use crate::device::texture::{self, Texel};
@@ -63,6 +63,8 @@ pub struct HeadOnGpu {
     pub(crate) opaque_triangles: u32,
     /// How many of these, the last ones, have holes where alpha says so.
     pub(crate) cut_triangles: u32,
+    /// How many of these, the last ones, are seen through where they are not quite opaque.
+    pub(crate) see_through_triangles: u32,
     pub(crate) overlay_triangles: u32,
     pub(crate) shape_count: usize,
     pub(crate) rest: wgpu::Buffer,
@@ -99,7 +101,10 @@ pub(crate) struct Surface {
 
 pub(crate) struct MapsOnGpu {
     pub(crate) skin: wgpu::TextureView,
+    /// Specular intensity and roughness; with a colour of its own that colour and the intensity in alpha.
     pub(crate) gloss: wgpu::TextureView,
+    /// The skin has a colour by itself; its roughness is in alpha of the slopes.
+    pub(crate) has_own_color: bool,
     pub(crate) hair_color_linear: [f32; 3],
     pub(crate) slopes: wgpu::TextureView,
     pub(crate) wrinkles: wgpu::TextureView,
@@ -146,7 +151,7 @@ impl HeadOnGpu {
             .iter()
             .map(|v| GpuVertex { point: v.point, u: v.uv.x, v: v.uv.y, padding: 0 })
             .collect();
-        let (triangles, [opaque, cut, overlay]) = ordered_triangles(head);
+        let (triangles, [opaque, cut, see_through, overlay]) = ordered_triangles(head);
         let corners = triangles[..opaque as usize].iter().flat_map(|t| &t[..3]);
         let opaque_points: Vec<u32> = corners.map(|v| mesh.vertices[*v as usize].point).collect();
         let (ring_starts, ring) = rings(head, &triangles);
@@ -162,6 +167,7 @@ impl HeadOnGpu {
             opaque_points: index_buffer(gpu, &opaque_points),
             opaque_triangles: opaque,
             cut_triangles: cut,
+            see_through_triangles: see_through,
             overlay_triangles: overlay,
             shape_count: head.shapes.len(),
             rest: gpu.storage("rest points", &rest),
@@ -306,17 +312,24 @@ fn merged_changes(shape: &BlendShape) -> Vec<(u32, Vec3, u32)> {
 }
 
 /// Triangles with the numbers of their material (see `authored.wesl`): opaque ones first, the last of them those with holes,
-/// then overlays; hidden ones are left out. How many are opaque, have holes, and are overlays.
-fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 3]) {
+/// of these the last ones those that are seen through; then overlays; hidden ones are left out. How many are opaque, have
+/// holes, are seen through, and are overlays.
+fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 4]) {
+    // Backs of parts with one side are holes too; skin has two.
     let has_holes = |part: usize| {
-        let material = head.authored_material(part);
-        material.is_some_and(|m| head.authored.materials[m as usize].cutoff().is_some())
+        let material = head.needed_material(part).map(|m| &head.authored.materials[m as usize]);
+        let is_skin = head.authored_material(part).is_none();
+        material.is_some_and(|m| m.cutoff().is_some() || m.is_see_through() || !(m.is_double_sided || is_skin))
+    };
+    let is_see_through = |part: usize| {
+        let material = head.authored_material(part).map(|m| &head.authored.materials[m as usize]);
+        material.is_some_and(|m| m.is_see_through())
     };
     let of = |wanted: &dyn Fn(usize, Material) -> bool| -> Vec<[u32; 4]> {
         (head.mesh.parts.iter().enumerate())
             .filter(|(index, part)| wanted(*index, part.material))
             .flat_map(|(index, part)| {
-                let authored = head.authored_material(index).map_or(0, |m| m + 1);
+                let authored = head.needed_material(index).map_or(0, |m| m + 1);
                 let number = part.material.number() | authored << AUTHORED_SHIFT;
                 head.mesh.triangles[part.triangles.start as usize..part.triangles.end as usize]
                     .iter()
@@ -326,11 +339,13 @@ fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 3]) {
     };
     let mut triangles = of(&|i, m| m.is_opaque() && !has_holes(i));
     let whole = triangles.len() as u32;
-    triangles.extend(of(&|i, m| m.is_opaque() && has_holes(i)));
+    triangles.extend(of(&|i, m| m.is_opaque() && has_holes(i) && !is_see_through(i)));
+    let solid = triangles.len() as u32;
+    triangles.extend(of(&|i, m| m.is_opaque() && is_see_through(i)));
     let opaque = triangles.len() as u32;
     triangles.extend(of(&|_, m| !m.is_opaque() && m != Material::Hidden));
     let overlay = triangles.len() as u32 - opaque;
-    (triangles, [opaque, opaque - whole, overlay])
+    (triangles, [opaque, opaque - whole, opaque - solid, overlay])
 }
 
 fn index_buffer(gpu: &Gpu, indices: &[u32]) -> wgpu::Buffer {
@@ -389,14 +404,29 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
             hair.sample(u, v, 0),
         ]
     });
-    let gloss_size = largest_of([specular]);
-    let gloss = texels(gloss_size, |u, v| [specular.sample(u, v, 0), specular.sample(u, v, 1), 0.0, 0.0]);
+    // Kernels of WebGPU read 16 textures and no more: a colour of its own shares one with the gloss.
+    let gloss = match &maps.albedo {
+        Some(albedo) => {
+            let size = largest_of([albedo, specular]);
+            let texel = |u, v| {
+                let [r, g, b] = [0, 1, 2].map(|c| albedo.sample(u, v, c));
+                [r, g, b, specular.sample(u, v, 0)]
+            };
+            texture::upload_srgb(gpu, "albedo", size, &[texture::mip_chain(size, texels(size, texel))])
+        }
+        None => {
+            let size = largest_of([specular]);
+            let texel = |u, v| [specular.sample(u, v, 0), specular.sample(u, v, 1), 0.0, 0.0];
+            texture::upload_bytes::<2>(gpu, "gloss", size, &[texture::mip_chain(size, texels(size, texel))])
+        }
+    };
     let slopes = maps.slopes.as_ref().unwrap_or(&flat);
-    let slope_size = largest_of([slopes]);
+    let slope_size = slope_size(maps);
+    let roughness = maps.albedo.as_ref().map(|_| specular);
     // Channel 2 averages the squared slope, so that each level contains the variance that it lost.
     let slope_texels = texels(slope_size, |u, v| {
         let (x, y) = (slopes.sample(u, v, 0), slopes.sample(u, v, 1));
-        [x, y, 0.5 * (x * x + y * y), 0.0]
+        [x, y, 0.5 * (x * x + y * y), roughness.map_or(0.0, |r| r.sample(u, v, 1))]
     });
     let mut slope_chain = texture::mip_chain(slope_size, slope_texels);
     for level in &mut slope_chain {
@@ -462,7 +492,8 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
 
     Some(MapsOnGpu {
         skin: texture::upload_bytes::<4>(gpu, "skin", size, &[texture::mip_chain(size, skin)]),
-        gloss: texture::upload_bytes::<2>(gpu, "gloss", gloss_size, &[texture::mip_chain(gloss_size, gloss)]),
+        gloss,
+        has_own_color: maps.albedo.is_some(),
         hair_color_linear: maps.hair_color_linear,
         slopes: texture::upload_half(gpu, "slopes", slope_size, &[slope_chain]),
         wrinkles: texture::array_view(&texture::upload_half(gpu, "wrinkles", wrinkle_size, &wrinkle_layers)),

@@ -244,7 +244,7 @@ fn gltf(file: &Path, findings: &mut Vec<Finding>) -> Option<Subject> {
 }
 
 fn head(file: &Path, findings: &mut Vec<Finding>) -> Option<Subject> {
-    match inputs::head_of_any_size(Some(file)) {
+    match inputs::plain_head(Some(file)) {
         Ok(loaded) => {
             findings.extend(loaded.notes.iter().map(|n| Finding::warning("", n.message.clone())));
             findings.extend(check::head::check(&loaded.head));

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use clap::Subcommand;
+use clap::{Subcommand, ValueEnum};
+use rubor_assets::convert::{chromophores, own_color};
 use rubor_assets::export::gltf::MapEncodings;
 use rubor_assets::{export, import, synthesize};
 use rubor_rig::expression::Rig;
@@ -69,6 +70,9 @@ pub(crate) struct Common {
     /// for the material of its author; can be repeated
     #[arg(long, value_parser = parse_part, value_name = "NAME=MATERIAL")]
     parts: Vec<(String, Material)>,
+    /// Factor from the values of skin textures to reflectances, for their blood: their colour stays [default: estimated]
+    #[arg(long)]
+    gain: Option<f32>,
     /// Smaller file: maps as JPEG, no normals of shapes for other viewers
     #[arg(long)]
     small: bool,
@@ -126,12 +130,14 @@ fn name_of(material: Material) -> String {
     serde_json::to_value(material).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
-/// Makes parts what the user says that they are.
-fn name_parts(head: &mut Head, parts: &[(String, Material)]) -> Outcome {
+/// Makes parts what the user says that they are; returns their indices.
+fn name_parts(head: &mut Head, parts: &[(String, Material)]) -> Outcome<Vec<usize>> {
+    let mut named = Vec::new();
     for (name, material) in parts {
         let mut found = false;
-        for part in head.mesh.parts.iter_mut().filter(|p| p.name == *name) {
+        for (index, part) in head.mesh.parts.iter_mut().enumerate().filter(|(_, p)| p.name == *name) {
             part.material = *material;
+            named.push(index);
             found = true;
         }
         if !found {
@@ -141,7 +147,7 @@ fn name_parts(head: &mut Head, parts: &[(String, Material)]) -> Outcome {
                 .hint(format!("expected one of\n  {}", names.join("\n  "))));
         }
     }
-    Ok(())
+    Ok(named)
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
@@ -177,7 +183,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
                 arguments.fit.apply(&mut head, &extent, Read::CENTIMETRES, source)?;
                 head
             } else {
-                let mut loaded = rubor::inputs::head_of_any_size(Some(source))?;
+                let mut loaded = rubor::inputs::plain_head(Some(source))?;
                 console::notes(&loaded.notes);
                 if let Some(mesh) = &arguments.mesh {
                     Fit::choose(&mut loaded.head, &mut loaded.extent, mesh, source)?;
@@ -255,7 +261,7 @@ pub(crate) fn finish_with(
     if path.extension().is_none_or(|e| e != "glb") {
         return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
     }
-    name_parts(&mut head, &common.parts)?;
+    let insisted = name_parts(&mut head, &common.parts)?;
     let layout = rubor_assets::check::head::layout(&head).into_iter().map(|f| {
         let fix = f.fix.map(|fix| format!("; {fix}")).unwrap_or_default();
         Note::new(path.display().to_string(), f.message + &fix)
@@ -263,14 +269,28 @@ pub(crate) fn finish_with(
     console::notes(&layout.collect::<Vec<_>>());
     let mut notes = Vec::new();
     common.scan.put_color(&mut head, &mut notes)?;
+    let chromophores = chromophores::Options { gain: common.gain, ..chromophores::Options::default() };
+    let options_of_color = own_color::Options { chromophores, insisted };
+    let about = path.display().to_string();
+    console::notes(&rubor::inputs::keep_color(&mut head, &about, &options_of_color)?);
+    if common.gain.is_some() && head.maps.albedo.is_none() {
+        console::notes(&[Note::new(&about, "no skin has a colour by itself: --gain has no effect")]);
+    }
     let has_skin = head.mesh.parts.iter().any(|p| p.material == Material::Skin);
     if !has_skin && common.maps > 0 {
         let message =
             "no part is skin: no maps, brows and lashes are made (`--parts NAME=skin` makes a part skin)";
         console::notes(&[Note::new(path.display().to_string(), message)]);
-    } else if head.maps.melanin.is_none() && common.maps > 0 {
+    } else if lacks_maps(&head) && common.maps > 0 {
         if !synthesize::finds_face(&head) {
-            let message = "no landmarks say where the face is: skin gets no hair, brows and wrinkles";
+            let message = match head.maps.albedo {
+                Some(_) => "no landmarks say where the face is: skin gets no wrinkles, and its blood changes alike everywhere",
+                None => "no landmarks say where the face is: skin gets no hair, brows and wrinkles",
+            };
+            console::notes(&[Note::new(path.display().to_string(), message)]);
+        }
+        if head.maps.albedo.is_some() && common.melanin.is_some() {
+            let message = "the skin has a colour by itself: --melanin has no effect";
             console::notes(&[Note::new(path.display().to_string(), message)]);
         }
         options.seed = common.seed.unwrap_or(options.seed);
@@ -295,6 +315,11 @@ pub(crate) fn finish_with(
     };
     export::gltf::write(&head, &options, path)?;
     report(&head, path)
+}
+
+/// Maps are to be made: there are none, or there is no more than the colour of the skin.
+fn lacks_maps(head: &Head) -> bool {
+    head.maps.melanin.is_none() || (head.maps.albedo.is_some() && head.maps.distributions.is_empty())
 }
 
 fn report(head: &Head, path: &Path) -> Outcome {
@@ -324,7 +349,7 @@ mod tests {
             head.mesh.parts.push(Part { name: name.into(), material: Material::Other, triangles: 0..0 });
         }
         let parts = ["a=b=skin", "hat=hidden"].map(|text| parse_part(text).unwrap());
-        name_parts(&mut head, &parts).unwrap();
+        assert_eq!(name_parts(&mut head, &parts).unwrap(), [0, 2, 1]);
         let found: Vec<Material> = head.mesh.parts.iter().map(|p| p.material).collect();
         assert_eq!(found, [Material::Skin, Material::Hidden, Material::Skin]);
         let unknown = name_parts(&mut head, &[("nose".into(), Material::Skin)]).unwrap_err();

@@ -11,6 +11,10 @@ pub(crate) enum Model {
     WithoutMaps,
     /// The same with a material of its own in place of skin: tiles, bumps, metal and holes.
     Authored,
+    /// Skin with a colour by itself.
+    Painted,
+    /// A blended pane and one of glass in front.
+    BehindPanes,
 }
 
 /// What is read.
@@ -210,6 +214,10 @@ fn materials() -> Vec<Case> {
         of("material-brow-and-lashes", "brow", &[Model::Default]),
         of("material-authored", "portrait", &[Model::Authored]),
         of("material-authored-sky", "environment-studio", &[Model::Authored]),
+        of("material-own-colour", "portrait", &[Model::Painted]),
+        of("material-own-colour-flushed", "blush", &[Model::Painted]),
+        of("material-see-through", "portrait", &[Model::BehindPanes]),
+        of("material-see-through-sky", "environment-studio", &[Model::BehindPanes]),
     ]
 }
 

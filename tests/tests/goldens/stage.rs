@@ -15,7 +15,8 @@ use rubor_rig::authored::{
     AlphaMode, AuthoredImage, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap,
 };
 use rubor_rig::evaluate::{LightState, Shot};
-use rubor_rig::head::{Head, Material, SkinMaps};
+use rubor_rig::head::{Head, Material, Part, SkinMaps, Vertex};
+use rubor_rig::map::Map;
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
 use rubor_rig::timeline;
 use rubor_tests::tolerance::Adapter;
@@ -55,7 +56,7 @@ pub(crate) struct Stage {
 }
 
 /// The default head and its variants.
-fn models() -> Outcome<[(Model, Head); 4]> {
+fn models() -> Outcome<[(Model, Head); 6]> {
     let file = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/head.glb"));
     let default = import::gltf::from_bytes(&std::fs::read(file)?, file)?.head;
     let mut dark = default.clone();
@@ -64,12 +65,68 @@ fn models() -> Outcome<[(Model, Head); 4]> {
     }
     let bare = Head { maps: SkinMaps::default(), ..default.clone() };
     let authored = tiled(bare.clone());
+    let (painted, panes) = (painted(default.clone()), behind_panes(default.clone()));
     Ok([
         (Model::Default, default),
         (Model::Dark, dark),
         (Model::WithoutMaps, bare),
         (Model::Authored, authored),
+        (Model::Painted, painted),
+        (Model::BehindPanes, panes),
     ])
+}
+
+/// A head whose skin has a colour by itself: pale stripes of three colours across the unit square.
+fn painted(mut head: Head) -> Head {
+    const SIDE: u32 = 256;
+    let stripe = |i: u32| match (i % SIDE + i / SIDE) / 10 % 3 {
+        0 => [0.75, 0.52, 0.42],
+        1 => [0.55, 0.60, 0.78],
+        _ => [0.30, 0.16, 0.10],
+    };
+    let values = (0..SIDE * SIDE).flat_map(stripe).collect();
+    head.maps.albedo = Some(Map { width: SIDE, height: SIDE, channels: 3, values });
+    head.maps.hair = None;
+    head
+}
+
+/// A head behind a blended pane and one of coated glass, which cross before its nose.
+fn behind_panes(mut head: Head) -> Head {
+    let (_, high) = head.bounds().unwrap_or_default();
+    for (name, turn) in [("blended", 0.6f32), ("glass", -0.6)] {
+        let mesh = &mut head.mesh;
+        let first = mesh.vertices.len() as u32;
+        for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 0.2), (-1.0, 0.2)] {
+            let point = mesh.points.len() as u32;
+            let place = 0.05 * Vec3::new(x * turn.cos(), y, x * turn.sin());
+            mesh.points.push(place + Vec3::new(0.0, -0.02, high.z + 0.03));
+            mesh.vertices.push(Vertex { point, uv: Vec2::new(x, y) });
+        }
+        let start = mesh.triangles.len() as u32;
+        mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        mesh.parts.push(Part { name: name.into(), material: Material::Other, triangles: start..start + 2 });
+    }
+    head.mesh.occlusion.resize(head.mesh.points.len(), 1.0);
+    let plain = AuthoredMaterial { metallic: 0.0, is_double_sided: true, ..AuthoredMaterial::default() };
+    head.authored.materials = vec![
+        AuthoredMaterial {
+            base_color: [0.9, 0.5, 0.1, 0.6],
+            roughness: 0.4,
+            alpha: AlphaMode::Blend,
+            ..plain.clone()
+        },
+        AuthoredMaterial {
+            base_color: [0.4, 0.9, 0.7, 1.0],
+            roughness: 0.6,
+            transmission: 0.9,
+            clearcoat: 1.0,
+            clearcoat_roughness: 0.1,
+            ..plain
+        },
+    ];
+    head.authored.of_parts = vec![None; head.mesh.parts.len() - 2];
+    head.authored.of_parts.extend([Some(0), Some(1)]);
+    head
 }
 
 /// A head whose skin is of tiles: half of them metal, with bumps, dark joints, and holes where alpha is none.
@@ -111,6 +168,7 @@ fn tiled(mut head: Head) -> Head {
         normal_texture: texture(2),
         occlusion_texture: texture(3),
         alpha: AlphaMode::Mask { cutoff: 0.5 },
+        is_double_sided: true,
         ..AuthoredMaterial::default()
     }];
     let parts = head.mesh.parts.iter_mut();

@@ -120,7 +120,7 @@ pub(super) fn primitives(
             primitive["attributes"]["COLOR_0"] =
                 json!(buffer.floats(&rest, Target::Vertices, false, buffer::COLOR));
         }
-        let is_authored = head.authored_material(material).is_some();
+        let is_authored = head.needed_material(material).is_some();
         if is_authored {
             let second: Vec<_> =
                 vertices.iter().map(|v| head.authored.second_uv(*v)).map(|uv| uv.to_array()).collect();

@@ -5,12 +5,14 @@ use rubor_rig::map::Map;
 
 use super::buffer::Buffer;
 use crate::error::ExportError;
-use crate::export::image_codec::{MapEncoding, encode_map, encode_png};
+use crate::export::image_codec::{MapEncoding, encode_colors, encode_map, encode_png};
 use crate::facial_appearance::{ChannelLayout, DistributionEntry, MapEntries, MapEntry, ZoneEntry};
 
 /// How each kind of map is stored. Zone masks are always 8-bit PNG, four to an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MapEncodings {
+    /// Colour of the skin by itself.
+    pub albedo: MapEncoding,
     /// Melanin.
     pub melanin: MapEncoding,
     /// Neutral hemoglobin.
@@ -32,6 +34,7 @@ impl Default for MapEncodings {
     fn default() -> Self {
         let png = MapEncoding::Png8;
         Self {
+            albedo: png,
             melanin: png,
             hemoglobin: png,
             distributions: MapEncoding::Png16,
@@ -47,6 +50,7 @@ impl MapEncodings {
     /// Small files: JPEG where the eye cannot tell.
     pub fn small() -> Self {
         Self {
+            albedo: MapEncoding::Jpeg(93),
             melanin: MapEncoding::Jpeg(92),
             hemoglobin: MapEncoding::Jpeg(85),
             // Smooth enough that 8 bits over their own range do not band.
@@ -59,12 +63,28 @@ impl MapEncodings {
     }
 }
 
-/// Adds the images and returns the entries of the extension.
+/// The colour of the skin as an image of the document.
+pub(super) fn write_albedo(
+    albedo: &Map,
+    encodings: &MapEncodings,
+    buffer: &mut Buffer,
+) -> Result<MapEntry, ExportError> {
+    let encoded = encode_colors("albedo", albedo, encodings.albedo)?;
+    let image = buffer.image("albedo", &encoded.bytes, encoded.mime_type) as u32;
+    Ok(MapEntry { image, layout: encoded.layout, offset: encoded.offset, scale: encoded.scale })
+}
+
+/// Adds the images and returns the entries of the extension. `albedo` is an image that is there already.
 pub(super) fn write(
     maps: &SkinMaps,
     encodings: &MapEncodings,
+    albedo: Option<MapEntry>,
     buffer: &mut Buffer,
 ) -> Result<MapEntries, ExportError> {
+    let albedo = match (&maps.albedo, albedo) {
+        (Some(map), None) => Some(write_albedo(map, encodings, buffer)?),
+        (_, written) => written,
+    };
     let mut put = |name: &str, map: &Map, encoding| -> Result<MapEntry, ExportError> {
         let encoded = encode_map(name, map, encoding)?;
         let image = buffer.image(name, &encoded.bytes, encoded.mime_type) as u32;
@@ -92,6 +112,7 @@ pub(super) fn write(
     }
     let zones = zones(&maps.zones, buffer)?;
     Ok(MapEntries {
+        albedo,
         melanin,
         hemoglobin,
         hemoglobin_mean,

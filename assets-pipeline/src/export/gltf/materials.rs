@@ -4,16 +4,19 @@ use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap};
 
 use image::ExtendedColorType;
-use rubor_rig::authored::{AlphaMode, Authored, AuthoredTexture, TextureTransform, Wrap};
+use rubor_rig::authored::{AlphaMode, Authored, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap};
 use rubor_rig::head::{Head, Material};
 use serde_json::{Value, json};
 
 use super::Options;
 use super::buffer::Buffer;
+use super::maps::write_albedo;
 use crate::error::ExportError;
 use crate::export::TextureFormat;
 use crate::export::eye_mouth::{EYE_TRANSFORM, TEETH_TRANSFORM};
 use crate::export::image_codec::encode_picture;
+use crate::export::skin_color::has_skin_color;
+use crate::facial_appearance::MapEntry;
 use crate::export::pictures::{Picture, Pictures, appearance};
 
 /// glTF extension of WebP pictures.
@@ -22,9 +25,11 @@ const WEBP: &str = "EXT_texture_webp";
 const TEXTURE_TRANSFORM: &str = "KHR_texture_transform";
 /// glTF extension of materials that show their colour without light.
 const UNLIT: &str = "KHR_materials_unlit";
-/// glTF extensions of reflection head on, and of its strength.
+/// glTF extensions of reflections, coats and glass.
 const IOR: &str = "KHR_materials_ior";
 const SPECULAR: &str = "KHR_materials_specular";
+const CLEARCOAT: &str = "KHR_materials_clearcoat";
+const TRANSMISSION: &str = "KHR_materials_transmission";
 /// glTF extension of emission above 1.
 const EMISSIVE_STRENGTH: &str = "KHR_materials_emissive_strength";
 
@@ -36,6 +41,8 @@ pub(super) struct Materials {
     /// Names of extensions that are used.
     extensions: BTreeSet<&'static str>,
     format: TextureFormat,
+    /// The colour of the skin by itself, where other viewers show the same picture.
+    pub(super) albedo: Option<MapEntry>,
 }
 
 impl Materials {
@@ -114,6 +121,50 @@ impl Materials {
             material["emissiveTexture"] = info;
         }
         material["pbrMetallicRoughness"] = surface;
+        let plain = AuthoredMaterial::default();
+        let mut extended: Vec<(&'static str, Value)> = Vec::new();
+        if from.ior != plain.ior {
+            extended.push((IOR, json!({"ior": from.ior})));
+        }
+        let mut reflection = json!({});
+        if from.specular != plain.specular {
+            reflection["specularFactor"] = json!(from.specular);
+        }
+        if from.specular_color != plain.specular_color {
+            reflection["specularColorFactor"] = json!(from.specular_color);
+        }
+        if let Some(info) = texture(&from.specular_texture)? {
+            reflection["specularTexture"] = info;
+        }
+        if let Some(info) = texture(&from.specular_color_texture)? {
+            reflection["specularColorTexture"] = info;
+        }
+        if reflection != json!({}) {
+            extended.push((SPECULAR, reflection));
+        }
+        if from.clearcoat > 0.0 {
+            let mut coat = json!({
+                "clearcoatFactor": from.clearcoat, "clearcoatRoughnessFactor": from.clearcoat_roughness,
+            });
+            if let Some(info) = texture(&from.clearcoat_texture)? {
+                coat["clearcoatTexture"] = info;
+            }
+            if let Some(info) = texture(&from.clearcoat_roughness_texture)? {
+                coat["clearcoatRoughnessTexture"] = info;
+            }
+            extended.push((CLEARCOAT, coat));
+        }
+        if from.transmission > 0.0 {
+            let mut glass = json!({"transmissionFactor": from.transmission});
+            if let Some(info) = texture(&from.transmission_texture)? {
+                glass["transmissionTexture"] = info;
+            }
+            extended.push((TRANSMISSION, glass));
+        }
+        for (name, value) in extended {
+            material["extensions"][name] = value;
+            self.extensions.insert(name);
+        }
         match from.alpha {
             AlphaMode::Opaque => {}
             AlphaMode::Mask { cutoff } => {
@@ -207,18 +258,23 @@ pub(super) fn write(
         samplers: vec![sampler([Wrap::Clamp; 2])],
         extensions: BTreeSet::new(),
         format: options.textures,
+        albedo: None,
     };
+    // The neutral colour of the skin is that map itself.
+    let own_color = head.maps.albedo.as_ref().filter(|_| {
+        options.pose.is_none() && color_factor == 1.0 && options.color_map_size > 0 && has_skin_color(head)
+    });
     let pictures = Pictures::new(
         head,
         options.pose.as_ref(),
-        options.color_map_size,
+        if own_color.is_some() { 0 } else { options.color_map_size },
         options.normal_map_size,
         color_factor,
     );
     let mut texture = |name: &str, picture: &Option<Picture>| {
         picture.as_ref().map(|p| out.texture(name, p, buffer)).transpose()
     };
-    let base_color = texture("base colour", &pictures.base_color)?;
+    let mut base_color = texture("base colour", &pictures.base_color)?;
     let normal = texture("normals", &pictures.normals)?;
     let gloss = texture("visibility and roughness", &pictures.gloss)?;
     let specular = texture("strength of reflection", &pictures.specular)?;
@@ -233,9 +289,15 @@ pub(super) fn write(
         })
     };
     let (eye, teeth) = (moved(&eye, EYE_TRANSFORM), moved(&teeth, TEETH_TRANSFORM));
+    if let Some(albedo) = own_color {
+        let entry = write_albedo(albedo, &options.maps, buffer)?;
+        out.textures.push(json!({"sampler": 0, "source": entry.image}));
+        base_color = Some(json!({"index": out.textures.len() - 1}));
+        out.albedo = Some(entry);
+    }
     let mut images = HashMap::new();
     for (index, part) in head.mesh.parts.iter().enumerate() {
-        if let Some(material) = head.authored_material(index) {
+        if let Some(material) = head.needed_material(index) {
             let material = out.authored(&head.authored, material, &mut images, buffer)?;
             out.materials.push(material);
             continue;

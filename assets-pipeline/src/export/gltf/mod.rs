@@ -152,7 +152,7 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
     let (primitives, parts) = geometry::primitives(head, &kept, &targets, &mut buffer);
     let factor = colors.as_ref().map_or(1.0, |c| 1.0 / c.rest);
     let mut materials = materials::write(head, options, factor, &mut buffer)?;
-    let maps = maps::write(&head.maps, &options.maps, &mut buffer)?;
+    let maps = maps::write(&head.maps, &options.maps, materials.albedo.clone(), &mut buffer)?;
     let occlusion = (!head.mesh.occlusion.is_empty()).then(|| buffer.normalized(&head.mesh.occlusion) as u32);
     let shape_occlusion = (kept.iter().map(|s| &head.shapes[*s]).filter(|s| !s.occlusion.is_empty()))
         .map(|shape| {

@@ -304,10 +304,12 @@ impl Builder<'_> {
         let authored = self.materials.read(material.index(), self.notes);
         let is_textured = self.materials.authored.materials[authored as usize].base_color_texture.is_some();
         let kind = match recognised {
-            // Eyes, teeth, hair and so on of rubor take texture coordinates of its own; skin would lose brows, lips and
-            // make-up that are painted, as no landmarks say where they are.
-            Some(kind) if is_textured && !matches!(kind, Material::Hidden | Material::Other) => {
-                let message = "textured skin, eyes, teeth, hair and lashes keep the look of their author";
+            // Eyes, teeth, hair and so on of rubor take texture coordinates of its own; skin keeps its colour
+            // (`convert::own_color`).
+            Some(kind)
+                if is_textured && !matches!(kind, Material::Skin | Material::Hidden | Material::Other) =>
+            {
+                let message = "textured eyes, teeth, hair and lashes keep the look of their author";
                 self.notes.add(message, name.as_str());
                 Material::Other
             }

@@ -13,7 +13,14 @@ use crate::import::picture;
 use crate::notes::Notes;
 
 /// Extensions of materials whose whole effect is read.
-const READ: [&str; 2] = ["KHR_materials_unlit", "KHR_materials_emissive_strength"];
+const READ: [&str; 6] = [
+    "KHR_materials_unlit",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_clearcoat",
+    "KHR_materials_transmission",
+];
 /// Extensions of textures that say where the picture is, in the order in which they are preferred to `source`.
 const SOURCES: [&str; 2] = ["KHR_texture_basisu", "EXT_texture_webp"];
 
@@ -87,9 +94,10 @@ impl<'a> Materials<'a> {
         for (name, _) in extensions.filter(|(name, _)| !READ.contains(&name.as_str())) {
             notes.add(format!("{name} is not drawn: the part looks as without it"), at);
         }
-        if raw["alphaMode"] == "BLEND" {
-            notes.add("blended materials are drawn opaque where alpha is at least one half", at);
+        if !raw["extensions"]["KHR_materials_clearcoat"]["clearcoatNormalTexture"].is_null() {
+            notes.add("normal maps of clear coats are not drawn: the coat is as smooth as the part", at);
         }
+        let extension = |name: &str, field: &str| &raw["extensions"][name][field];
         let mut share = |value: &Value, default: f32| number(value, default, 0.0..=1.0, at, notes);
         let base = &surface["baseColorFactor"];
         let emission = &raw["emissiveFactor"];
@@ -97,6 +105,18 @@ impl<'a> Materials<'a> {
         let (metallic, roughness) =
             (share(&surface["metallicFactor"], 1.0), share(&surface["roughnessFactor"], 1.0));
         let occlusion_strength = share(&raw["occlusionTexture"]["strength"], 1.0);
+        let specular = share(extension("KHR_materials_specular", "specularFactor"), 1.0);
+        let clearcoat = share(extension("KHR_materials_clearcoat", "clearcoatFactor"), 0.0);
+        let clearcoat_roughness =
+            share(extension("KHR_materials_clearcoat", "clearcoatRoughnessFactor"), 0.0);
+        let transmission = share(extension("KHR_materials_transmission", "transmissionFactor"), 0.0);
+        let tint = extension("KHR_materials_specular", "specularColorFactor");
+        let specular_color = [0, 1, 2].map(|c| number(&tint[c], 1.0, 0.0..=f32::MAX, at, notes));
+        let ior = match extension("KHR_materials_ior", "ior") {
+            // 0 stands for a reflectance of 1.
+            zero if zero.as_f64() == Some(0.0) => 0.0,
+            index => number(index, 1.5, 1.0..=f32::MAX, at, notes),
+        };
         let any = f32::MIN..=f32::MAX;
         let normal_scale = number(&raw["normalTexture"]["scale"], 1.0, any, at, notes);
         let strength = &raw["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"];
@@ -127,6 +147,26 @@ impl<'a> Materials<'a> {
             alpha,
             is_double_sided: raw["doubleSided"] == true,
             is_unlit: raw["extensions"].get("KHR_materials_unlit").is_some(),
+            ior,
+            specular,
+            specular_texture: texture(extension("KHR_materials_specular", "specularTexture"), "specular"),
+            specular_color,
+            specular_color_texture: texture(
+                extension("KHR_materials_specular", "specularColorTexture"),
+                "specular colour",
+            ),
+            clearcoat,
+            clearcoat_texture: texture(extension("KHR_materials_clearcoat", "clearcoatTexture"), "clear coat"),
+            clearcoat_roughness,
+            clearcoat_roughness_texture: texture(
+                extension("KHR_materials_clearcoat", "clearcoatRoughnessTexture"),
+                "clear coat roughness",
+            ),
+            transmission,
+            transmission_texture: texture(
+                extension("KHR_materials_transmission", "transmissionTexture"),
+                "transmission",
+            ),
         }
     }
 

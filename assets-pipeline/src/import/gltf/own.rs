@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 use gltf::Semantic;
 use rubor_rig::authored::Authored;
+use rubor_rig::color::srgb_decode;
 use rubor_rig::head::{
     BlendShape, Distribution, Head, Mesh, OcclusionChange, Part, SkinMaps, Vertex, WrinkleZone,
 };
@@ -212,6 +213,7 @@ fn maps(document: &Document, entries: &MapEntries) -> Result<SkinMaps, ImportErr
         entry.as_ref().map(|e| map(document, name, e, channels, 0)).transpose()
     };
     let mut maps = SkinMaps {
+        albedo: optional("albedo", &entries.albedo, 3)?,
         melanin: optional("melanin", &entries.melanin, 1)?,
         hemoglobin: optional("hemoglobin", &entries.hemoglobin, 1)?,
         hemoglobin_mean: optional("hemoglobin mean", &entries.hemoglobin_mean, 1)?,
@@ -265,6 +267,7 @@ fn map(
         ChannelLayout::First => (1, vec![0]),
         ChannelLayout::Stacked => (1, vec![0, (width * (height / 2)) as usize]),
         ChannelLayout::Interleaved => (4, vec![0, 1]),
+        ChannelLayout::Color => (4, vec![0, 1, 2]),
         ChannelLayout::Channel => (4, vec![channel as usize]),
     };
     if starts.len() != channels as usize || (entry.layout == ChannelLayout::Stacked && height % 2 != 0) {
@@ -277,7 +280,9 @@ fn map(
     } else if step == 1 {
         picture.to_luma16().into_raw().into_iter().map(|t| f32::from(t) / 65535.0).collect()
     } else {
-        picture.to_rgba8().into_raw().into_iter().map(|t| f32::from(t) / 255.0).collect()
+        let linear = |code: f32| if entry.layout == ChannelLayout::Color { srgb_decode(code) } else { code };
+        let value: Vec<f32> = (0..=255u8).map(|code| linear(f32::from(code) / 255.0)).collect();
+        picture.to_rgba8().into_raw().into_iter().map(|t| value[usize::from(t)]).collect()
     };
     let height = if entry.layout == ChannelLayout::Stacked { height / 2 } else { height };
     let count = (width * height) as usize;

@@ -7,7 +7,7 @@ use rubor_rig::authored::{
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Head, Material};
 
-use super::reference::MetallicRoughness;
+use super::reference::{Coated, MetallicRoughness};
 use super::tests::largest_error;
 use crate::channels::Channel;
 use crate::tests::{WHITE_TABLE, dome, read_texels, render, renderer, settings};
@@ -74,6 +74,56 @@ fn a_lamp_on_it_is_the_equation() {
             largest_error(&renderer, &head, &CAMERA, SIZE, &light, |n, l, v| expected.radiance(n, l, v));
         // Halves keep 11 bits; the rest is f32 in a lobe whose slope multiplies errors of the half vector.
         assert!(compared > 200 && largest < 0.004, "{direction}: {compared} pixels, error up to {largest}");
+    }
+}
+
+#[test]
+fn index_strength_and_coat_are_those_of_the_extensions() {
+    let Some(mut renderer) = renderer() else { return };
+    let base = 0.5f32;
+    for (ior, specular, coat) in [(2.0f32, 1.0f32, [0.0f32, 0.0f32]), (1.5, 0.3, [0.0; 2]), (1.33, 0.8, [0.7, 0.25])] {
+        let material = AuthoredMaterial {
+            base_color: [base, base, base, 1.0],
+            metallic: 0.0,
+            roughness: 0.5,
+            ior,
+            specular,
+            clearcoat: coat[0],
+            clearcoat_roughness: coat[1],
+            ..Default::default()
+        };
+        let head = head(material);
+        let under = MetallicRoughness { base: f64::from(base), metallic: 0.0, roughness: 0.5 };
+        let expected = Coated {
+            under,
+            ior: f64::from(ior),
+            specular: f64::from(specular),
+            coat: coat.map(f64::from),
+        };
+        let light = lamp(Vec3::new(-0.5, -0.4, -0.8));
+        draw(&mut renderer, &head, &[light], false);
+        let (compared, largest) =
+            largest_error(&renderer, &head, &CAMERA, SIZE, &light, |n, l, v| expected.radiance(n, l, v));
+        assert!(compared > 200 && largest < 0.006, "{ior}: {compared} pixels, error up to {largest}");
+    }
+}
+
+#[test]
+fn a_coloured_reflection_has_its_colour() {
+    let Some(mut renderer) = renderer() else { return };
+    // Black paint under an even sky shows its reflection alone.
+    let material = AuthoredMaterial {
+        base_color: [0.0, 0.0, 0.0, 1.0],
+        metallic: 0.0,
+        roughness: 0.4,
+        specular_color: [1.0, 0.5, 0.0],
+        ..Default::default()
+    };
+    let hdr = draw(&mut renderer, &head(material), &[], true);
+    let [r, g, b, _] = hdr[(SIZE / 2 * SIZE + SIZE / 2) as usize];
+    let share = |f0: f64| MetallicRoughness { base: f0, metallic: 1.0, roughness: 0.4 }.reflected_sky(1.0);
+    for (found, f0) in [(r, 0.04), (g, 0.02), (b, 0.0)] {
+        assert!((f64::from(found) - share(f0)).abs() < 0.002, "{found} for {}", share(f0));
     }
 }
 

@@ -29,6 +29,10 @@
 //!
 //! Highlights of skin may have two lobes ([`SpecularMethod`]): D is their weighted mean, so the table is the same mean.
 //!
+//! Skin that has a colour by itself ([`rubor_rig::head::SkinMaps::albedo`]) shows that colour, times the ratio of the look-up's
+//! colours with the blood of the frame and with that at rest ([`rubor_rig::skin::chromophores::SkinLookup::with_blood`]); it
+//! gets no microscopic relief.
+//!
 //! Differs from the sources: slope variance lost by minification widens the Beckmann lobe (Toksvig 2005), and so
 //! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
 //!
@@ -54,7 +58,8 @@
 //!
 //! Parts that keep the material of their author (`authored.wesl`) have a dispatch of their own, which heads without such
 //! parts do not have: metallic-roughness of glTF 2.0, appendix B (GGX, Smith, Schlick, Lambert), lamps and shadows as for
-//! skin, the environment by a table (`ggx_albedo`). It does not cull backs of single-sided parts.
+//! skin, the environment by a table (`ggx_albedo`), and of the extensions of glTF ior, specular, clearcoat and transmission
+//! through thin walls. What is seen through is lit layer by layer (`see_through`) with the same code.
 //!
 //! Does not: reflect one part of the head in another; carry light between parts of an eye or the mouth.
 
@@ -71,6 +76,7 @@ use std::sync::OnceLock;
 
 use glam::{Vec3, Vec4};
 use rubor_rig::head::{EYE_RADIUS_MM, LIMBUS_UV, Material};
+use rubor_rig::skin::chromophores::{CHANGE_FLOOR, MOST_CHANGE};
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::skin::transmittance::TransmittanceTable;
 
@@ -80,6 +86,7 @@ use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder, texture};
 use crate::error::RenderError;
 use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::pixel_groups;
+use crate::passes::see_through::Sum;
 use crate::scene::head::AUTHORED_SHIFT;
 use crate::scene::lamp::{GpuLight, Illumination};
 use crate::scene::view::Seen;
@@ -146,7 +153,10 @@ fn with_constants(program: Program) -> Program {
         .constant("LEAST_HALF_SQUARE", directional_albedo::LEAST_SQUARE)
         .constant("SKIN_F0", SKIN_F0)
         .constant("SKIN", Material::Skin.number())
+        .constant("CHANGE_FLOOR", CHANGE_FLOOR)
+        .constant("MOST_CHANGE", MOST_CHANGE)
         .constant("MUCOSA", Material::Mucosa.number())
+        .constant("OTHER", Material::Other.number())
         .constant("EYE", Material::Eye.number())
         .constant("EYE_RADIUS_MM", EYE_RADIUS_MM)
         .constant("IRIS_ANGLE", LIMBUS_UV * std::f32::consts::TAU)
@@ -176,7 +186,7 @@ pub(crate) struct Params {
     pub(crate) hair_color: [f32; 4],
     pub(crate) is_second_sample: u32,
     pub(crate) transmit_per_mm: f32,
-    pub(crate) adds_differences: u32,
+    pub(crate) skin_flags: u32,
     pub(crate) pupil_mm: f32,
     pub(crate) lobes: [f32; 3],
     pub(crate) mm_per_texture: f32,
@@ -286,13 +296,22 @@ pub(crate) struct Lit {
     pub(crate) direct: Image,
 }
 
+/// Pipelines and table of materials of authors.
+struct AuthoredKernels {
+    opaque: Kernel,
+    layer: Kernel,
+    ggx_albedo: wgpu::TextureView,
+    /// Of no layer all of what lies behind passes.
+    white: wgpu::TextureView,
+}
+
 /// The pipelines of the pass.
 pub(crate) struct Shade {
     kernel: Kernel,
     /// Made by the first frame that lights points of the surface.
     samples_kernel: Option<(bool, Kernel)>,
     /// Made by the first frame that shows a material of an author.
-    authored_kernel: OnceLock<(Kernel, wgpu::TextureView)>,
+    authored_kernel: OnceLock<AuthoredKernels>,
     /// Whether shadow maps are floats and no depth textures.
     stored_shadows: bool,
     trilinear_repeat: wgpu::Sampler,
@@ -380,18 +399,54 @@ impl Shade {
         if heads.iter().all(|h| h.head.authored.is_none()) {
             return lit;
         }
-        let (kernel, ggx_albedo) =
-            self.authored_kernel.get_or_init(|| authored_kernel(r.gpu, self.stored_shadows));
+        let kernels = self.authored_kernels(r.gpu);
         let authored = heads.iter().zip(&params).filter_map(|(h, params)| {
             let authored = h.head.authored.as_ref()?;
             let mut resources = resources(h, params);
             resources.extend(authored.resources());
             resources.push(("authored_data", authored.data.bound()));
-            resources.push(("ggx_albedo", ggx_albedo.bound()));
+            resources.push(("ggx_albedo", kernels.ggx_albedo.bound()));
             Some((resources, pixel_groups(size)))
         });
-        r.dispatch_each(kernel, authored);
+        r.dispatch_each(&kernels.opaque, authored);
         lit
+    }
+
+    fn authored_kernels(&self, gpu: &Gpu) -> &AuthoredKernels {
+        self.authored_kernel.get_or_init(|| AuthoredKernels::new(gpu, self.stored_shadows))
+    }
+
+    /// Adds the light of a layer that is seen through, whose ids are those of `lighting`, to that of the layers before.
+    pub(crate) fn record_layer(
+        &self,
+        r: &mut Recorder<'_>,
+        lighting: &Lighting<'_>,
+        heads: &[PosedHead<'_>],
+        before: Option<&Sum>,
+    ) -> Sum {
+        let size = lighting.seen.ids.size();
+        let sum = Sum::new(r, size);
+        let kernels = self.authored_kernels(r.gpu);
+        let params: Vec<_> = heads.iter().map(|h| r.uniform("shade layer", &params(lighting, h))).collect();
+        // The first head also carries the sum on where there is no layer, whatever its materials.
+        let any = heads.iter().find_map(|h| h.head.authored.as_ref());
+        let each = heads.iter().zip(&params).filter_map(|(h, params)| {
+            let is_first = h.index == 0;
+            let authored = h.head.authored.as_ref().or(any.filter(|_| is_first))?;
+            let mut resources = self.resources(lighting, h, params);
+            resources.extend(authored.resources());
+            resources.extend([
+                ("authored_data", authored.data.bound()),
+                ("ggx_albedo", kernels.ggx_albedo.bound()),
+                ("sum_radiance", before.map_or(self.black.bound(), |b| b.radiance.bound())),
+                ("sum_share", before.map_or(kernels.white.bound(), |b| b.share.bound())),
+                ("sum_radiance_out", sum.radiance.bound()),
+                ("sum_share_out", sum.share.bound()),
+            ]);
+            Some((resources, pixel_groups(size)))
+        });
+        r.dispatch_each(&kernels.layer, each);
+        sum
     }
 
     /// Makes the resources of [`Shade::record_samples`].
@@ -451,11 +506,17 @@ impl Shade {
     }
 }
 
-fn authored_kernel(gpu: &Gpu, stored_shadows: bool) -> (Kernel, wgpu::TextureView) {
-    let table = vec![vec![ggx_albedo::table()]];
-    let table = texture::upload_half(gpu, "GGX albedo", ggx_albedo::SIZE, &table);
-    let program = authored_program().flag("stored_shadows", stored_shadows);
-    (Kernel::new(gpu, "shade authored", &program, "shade_authored"), table)
+impl AuthoredKernels {
+    fn new(gpu: &Gpu, stored_shadows: bool) -> Self {
+        let program = authored_program().flag("stored_shadows", stored_shadows);
+        let table = vec![vec![ggx_albedo::table()]];
+        Self {
+            opaque: Kernel::new(gpu, "shade authored", &program, "shade_authored"),
+            layer: Kernel::new(gpu, "shade layer", &program, "shade_layer"),
+            ggx_albedo: texture::upload_half(gpu, "GGX albedo", ggx_albedo::SIZE, &table),
+            white: texture::upload_half(gpu, "white", [1, 1], &[vec![vec![[1.0; 4]]]]),
+        }
+    }
 }
 
 fn upload_directional_albedo(gpu: &Gpu, method: SpecularMethod) -> wgpu::TextureView {
@@ -488,7 +549,8 @@ pub(crate) fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
             }
         },
         is_second_sample: u32::from(lighting.first.is_some()),
-        adds_differences: u32::from(quality.wrinkles == WrinkleMethod::Difference),
+        skin_flags: u32::from(quality.wrinkles == WrinkleMethod::Difference)
+            | u32::from(maps.is_some_and(|m| m.has_own_color)) << 1,
         pupil_mm: posed.state.pupil_mm,
         transmit_per_mm: lighting.transmittance.map_or(0.0, |t| 1.0 / t.thickness_max_mm),
         lobes: quality.specular.lobes(),

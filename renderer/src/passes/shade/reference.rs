@@ -53,6 +53,44 @@ impl Skin {
     }
 }
 
+/// What the extensions of glTF 2.0 add to a [`MetallicRoughness`] of metallic 0: an index of refraction, the strength of the
+/// reflection and a clear coat.
+pub(crate) struct Coated {
+    /// What lies under the coat; its `metallic` is taken as 0.
+    pub(crate) under: MetallicRoughness,
+    /// Index of refraction (`KHR_materials_ior`).
+    pub(crate) ior: f64,
+    /// Factor of the reflection, at grazing angles too (`KHR_materials_specular`).
+    pub(crate) specular: f64,
+    /// Share and perceptual roughness of the coat (`KHR_materials_clearcoat`).
+    pub(crate) coat: [f64; 2],
+}
+
+impl Coated {
+    /// Radiance towards a viewer for unit irradiance across the light; all unit vectors:
+    /// (1 - c F(V)) under + c F(V) D G / (4 cos(V)).
+    pub(crate) fn radiance(&self, normal: DVec3, to_light: DVec3, to_viewer: DVec3) -> f64 {
+        let (cos_light, cos_viewer) = (normal.dot(to_light), normal.dot(to_viewer));
+        if cos_light <= 0.0 || cos_viewer <= 0.0 {
+            return 0.0;
+        }
+        let half = (to_light + to_viewer).normalize();
+        let lobe = |roughness: f64| {
+            let a2 = roughness.powi(4);
+            let d = a2 / (PI * (normal.dot(half).powi(2) * (a2 - 1.0) + 1.0).powi(2));
+            let masking = |cosine: f64| 2.0 * cosine / (cosine + (a2 + (1.0 - a2) * cosine * cosine).sqrt());
+            d * masking(cos_light) * masking(cos_viewer) / (4.0 * cos_viewer)
+        };
+        let schlick = |f0: f64, f90: f64, cosine: f64| f0 + (f90 - f0) * (1.0 - cosine).powi(5);
+        let f0 = self.specular * ((self.ior - 1.0) / (self.ior + 1.0)).powi(2);
+        let fresnel = schlick(f0, self.specular, half.dot(to_viewer));
+        let under =
+            cos_light * (1.0 - fresnel) * self.under.base / PI + fresnel * lobe(self.under.roughness);
+        let coat = self.coat[0] * schlick(0.04, 1.0, cos_viewer);
+        (1.0 - coat) * under + coat * lobe(self.coat[1])
+    }
+}
+
 /// The metallic-roughness model of glTF 2.0, appendix B, with one lobe of GGX.
 pub(crate) struct MetallicRoughness {
     /// Linear base colour of one channel.

@@ -2,8 +2,11 @@
 
 use glam::{DVec3, Mat4, Vec2, Vec3};
 use rubor_rig::face_state::FaceState;
-use rubor_rig::head::{Head, Material, Mesh, Part, Vertex};
+use rubor_rig::color::{srgb_decode, srgb_encode};
+use rubor_rig::head::{Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex};
 use rubor_rig::map::Map;
+use rubor_rig::random::SplitMix64;
+use rubor_rig::skin::chromophores::{ChromophoreModel, MAX_HEMOGLOBIN, MAX_MELANIN, SkinModel};
 
 use super::reference;
 use crate::channels::Channel;
@@ -11,7 +14,7 @@ use crate::settings::{ScatterMethod, TransmitMethod};
 use crate::tests::{
     WHITE_TABLE, dome, read, read_texels, read_vectors, render, renderer, seen_surface, settings,
 };
-use crate::{Camera, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
+use crate::{Camera, ColorTable, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
 const SIZE: u32 = 128;
 /// Across the picture.
@@ -182,5 +185,91 @@ fn a_lamp_on_bare_skin_is_the_equation() {
             largest_error(&renderer, &head, &camera, size, &lamp, |n, l, v| skin.radiance(n, l, v));
         // The table of reflected shares is linear between 32 cosines and 32 roughnesses; halves keep 11 bits.
         assert!(compared > 200 && largest < 0.01, "{direction}: {compared} pixels, error up to {largest}");
+    }
+}
+
+/// A sheet that fills the picture of a camera far away, its texture once across: a texel is a pixel.
+fn sheet(maps: SkinMaps) -> (Head, Camera) {
+    let fov_degrees = 1.0f32;
+    let half = 0.1;
+    let mut mesh = Mesh::default();
+    for (x, y) in [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
+        let point = mesh.points.len() as u32;
+        mesh.points.push(half * Vec3::new(x, y, 0.0));
+        mesh.vertices.push(Vertex { point, uv: 0.5 + 0.5 * Vec2::new(x, -y) });
+    }
+    mesh.triangles = vec![[0, 2, 1], [0, 3, 2]];
+    mesh.parts = vec![Part { name: "skin".into(), material: Material::Skin, triangles: 0..2 }];
+    let distance = half / (0.5 * fov_degrees.to_radians()).tan();
+    let camera = Camera { position: distance * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees };
+    (Head { name: "sheet".into(), mesh, maps, ..Head::default() }, camera)
+}
+
+#[test]
+fn skin_of_its_own_colour_shows_it_and_follows_blood() {
+    let Some(mut renderer) = renderer() else { return };
+    let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
+    let table = ColorTable { width: lookup.width, height: lookup.height, texels: &lookup.texels };
+    let size = 32;
+    let mut random = SplitMix64(3);
+    // Every kind of colour in sRGB codes: paint, black, white, skin.
+    let codes: Vec<u8> = (0..3 * size * size)
+        .map(|i| match i / (3 * size) {
+            0 => 0,
+            1 => 255,
+            2..16 => random.below(256) as u8,
+            _ => [225, 172, 150][i as usize % 3] - random.below(20) as u8,
+        })
+        .collect();
+    let values = codes.iter().map(|c| srgb_decode(f32::from(*c) / 255.0)).collect();
+    let flat = |v| Map::filled(1, 1, &[v]);
+    let (melanin, blood, flushed) = (0.02f32, 0.016f32, 0.05f32);
+    let maps = SkinMaps {
+        albedo: Some(Map { width: size, height: size, channels: 3, values }),
+        melanin: Some(flat(melanin)),
+        hemoglobin: Some(flat(blood)),
+        hemoglobin_mean: Some(flat(blood)),
+        distributions: vec![Distribution { name: "blush".into(), scale: flat(1.0), bias: flat(flushed) }],
+        specular: Some(Map::filled(1, 1, &[0.3, 0.4])),
+        ..SkinMaps::default()
+    };
+    let (head, camera) = sheet(maps);
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &table).expect("it uploads");
+    let mut state = FaceState::neutral(&head);
+    let mut draw = |state: &FaceState| {
+        let scene = Scene {
+            heads: &[HeadInstance { head: &on_gpu, state, world_from_head: Mat4::IDENTITY }],
+            camera,
+            lights: &[],
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+        };
+        render(&mut renderer, &scene, &settings([size; 2])).expect("it draws");
+        read_texels(&renderer, Channel::Albedo)
+    };
+    let neutral = draw(&state);
+    for (i, found) in neutral.iter().enumerate() {
+        for c in 0..3 {
+            let code = 255.0 * srgb_encode(found[c]);
+            let expected = f32::from(codes[3 * i + c]);
+            assert!((code - expected).abs() < 0.75, "texel {i}: {code} for {expected}");
+        }
+    }
+    state.distributions[0] = 1.0;
+    // The map keeps 8 bits of the address, the device's filter 8 bits between texels of the table.
+    let address = |v: f32, most: f64| {
+        let code = (f64::from(v) / most).cbrt() * 255.0;
+        (most * (code.round() / 255.0).powi(3)) as f32
+    };
+    let (m, h) = (address(melanin, MAX_MELANIN), address(blood, MAX_HEMOGLOBIN));
+    let change = lookup.change(m, h, h + flushed - blood);
+    assert!(change[1] < 0.8 * change[0], "a flush takes green: {change:?}");
+    for (i, (found, before)) in draw(&state).iter().zip(&neutral).enumerate() {
+        for c in 0..3 {
+            let expected = (change[c] * before[c]).min(1.0);
+            assert!((found[c] - expected).abs() < 0.01 * expected + 1e-3, "texel {i}: {found:?}, {expected}");
+        }
     }
 }

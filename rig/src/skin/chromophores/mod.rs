@@ -83,6 +83,13 @@ impl Default for ChromophoreModel {
     }
 }
 
+/// Added to both colours of a change of blood, so that components near 0, or slightly below, have a ratio: half a step of
+/// 8 bits.
+pub const CHANGE_FLOOR: f32 = 0.002;
+/// Largest factor, and one over the least, by which blood changes a component of a colour that skin has by itself. Changes
+/// between 1 % and 8 % blood stay within it at any melanin.
+pub const MOST_CHANGE: f32 = 4.0;
+
 /// Address in the look-up of volume fractions, clamped to 0..1 (Jimenez 2012 eq. 7.7, scaled to the ranges of table 7.1).
 pub fn lookup_address(melanin: f64, hemoglobin: f64) -> [f64; 2] {
     [(melanin / MAX_MELANIN).clamp(0.0, 1.0).cbrt(), (hemoglobin / MAX_HEMOGLOBIN).clamp(0.0, 1.0).cbrt()]
@@ -280,6 +287,28 @@ impl SkinLookup {
     pub fn sample(&self, melanin: f32, hemoglobin: f32) -> [f32; 3] {
         let [u, v] = lookup_address(f64::from(melanin), f64::from(hemoglobin)).map(|a| a as f32);
         self.sample_at(u, v)
+    }
+
+    /// Factors of a linear Rec. 709 colour that skin has by itself when its hemoglobin goes from one volume fraction to
+    /// another: the ratio of the look-up's colours, at most [`MOST_CHANGE`] up or down; exactly 1 where nothing changes.
+    pub fn change(&self, melanin: f32, from_hemoglobin: f32, to_hemoglobin: f32) -> [f32; 3] {
+        let (from, to) = (self.sample(melanin, from_hemoglobin), self.sample(melanin, to_hemoglobin));
+        [0, 1, 2].map(|c| {
+            let floor = |v: f32| v.max(0.0) + CHANGE_FLOOR;
+            (floor(to[c]) / floor(from[c])).clamp(1.0 / MOST_CHANGE, MOST_CHANGE)
+        })
+    }
+
+    /// Linear Rec. 709 albedo of skin that has a colour by itself, after a change of blood: at most 1.
+    pub fn with_blood(
+        &self,
+        own_linear: [f32; 3],
+        melanin: f32,
+        from_hemoglobin: f32,
+        to_hemoglobin: f32,
+    ) -> [f32; 3] {
+        let change = self.change(melanin, from_hemoglobin, to_hemoglobin);
+        [0, 1, 2].map(|c| (own_linear[c] * change[c]).min(own_linear[c].max(1.0)))
     }
 
     /// Bilinear sample at an address, 0..1; a value that is not a number counts as 0.

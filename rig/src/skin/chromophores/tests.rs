@@ -189,3 +189,32 @@ fn addresses_are_clamped_and_invert() {
     let last = lookup.sample(1.0, 1.0);
     assert!((0..3).all(|i| (last[i] - lookup.texels[5][i]).abs() < 1e-6), "{last:?}");
 }
+
+#[test]
+fn a_colour_of_its_own_follows_blood_as_the_look_up_does() {
+    let (_, skin) = skin();
+    let lookup = skin.bake(64, 64);
+    let (m, h) = (0.02, 0.02);
+    for own in [[0.0; 3], [1.0; 3], [0.02, 0.01, 0.01], [0.9, 0.75, 0.7], [0.1, 0.2, 0.9]] {
+        assert_eq!(lookup.with_blood(own, m, h, h), own, "nothing changes");
+        for to in [0.0, 0.05, 0.32] {
+            let moved = lookup.with_blood(own, m, h, to);
+            assert!(moved.iter().all(|c| (0.0..=1.0).contains(c)), "{own:?} at {to}: {moved:?}");
+        }
+    }
+    // The look-up's own colour moves along the look-up, but for the floor that keeps ratios finite.
+    let moved = lookup.with_blood(lookup.sample(m, h), m, h, 0.06);
+    let difference = ciede2000(lab(moved), lab(lookup.sample(m, 0.06)));
+    assert!(difference < 0.3, "{difference}");
+    // Blood takes green first, in painted colours too.
+    let [r, g, b] = lookup.with_blood([0.95, 0.8, 0.75], m, h, 0.06);
+    assert!(g / 0.8 < b / 0.75 && b / 0.75 < r / 0.95, "{r} {g} {b}");
+    // From 1 % to 8 % blood, pale to flushed, nothing meets the bound.
+    for i in 0..=50 {
+        let m = fractions_at(f64::from(i) / 50.0, 0.0)[0] as f32;
+        let both = [lookup.change(m, 0.01, 0.08), lookup.change(m, 0.08, 0.01)];
+        for c in both.as_flattened() {
+            assert!(*c < 0.95 * MOST_CHANGE && *c > 1.05 / MOST_CHANGE, "melanin {m}: {c}");
+        }
+    }
+}

@@ -8,7 +8,7 @@ use rubor_assets::convert::into_head;
 use rubor_assets::convert::skin_texels::{SkinTexels, require_layout};
 use rubor_assets::image_io::{Purpose, SampleKind};
 use rubor_rig::map::Map;
-use rubor_rig::mask::Mask;
+use rubor_rig::mask::{Mask, fill_unmapped};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
 use serde_json::{Value, json};
 
@@ -32,9 +32,12 @@ pub(crate) struct ChromophoresArgs {
     /// The file is linear Rec. 709 [default: sRGB for integers, linear for floats]
     #[arg(long)]
     linear: bool,
-    /// Factor from the values to reflectance
-    #[arg(long, default_value_t = 1.0)]
-    gain: f32,
+    /// Factor from the values to reflectance, for melanin and hemoglobin: the colour stays [default: estimated]
+    #[arg(long)]
+    gain: Option<f32>,
+    /// Leave the colour out: the head then shows what melanin and hemoglobin can say
+    #[arg(long)]
+    no_color: bool,
     /// CIEDE2000 residual above which a texel is out of gamut
     #[arg(long, default_value_t = DEFAULT_GAMUT_THRESHOLD)]
     threshold: f32,
@@ -44,12 +47,18 @@ pub(crate) struct ChromophoresArgs {
     to: Destination,
 }
 
+/// Texels that show no skin take the colour of the skin around them: filters read it at the edges.
+fn filled(mut albedo: Map, mask: &Mask) -> Map {
+    fill_unmapped(&mut albedo, mask);
+    albedo
+}
+
 pub(super) fn run(a: &ChromophoresArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
     let receiver = a.to.head(notes)?;
     let image = load(&a.albedo, &a.images.options(Purpose::Values), notes)?;
     let mut mask = load_mask(&image, a.mask.as_deref(), notes)?;
     let encoding = if a.linear { AlbedoEncoding::Linear } else { AlbedoEncoding::Automatic };
-    let albedo = chromophores::linear_albedo(&image, encoding, a.gain)?;
+    let albedo = chromophores::linear_albedo(&image, encoding)?;
     if let Some(receiver) = &receiver {
         let skin = SkinTexels::new(&receiver.head, mask.width, mask.height).mask();
         let not_black = |(m, c): (&bool, &[f32])| *m && c.iter().any(|v| *v > 0.0);
@@ -64,8 +73,18 @@ pub(super) fn run(a: &ChromophoresArgs, notes: &mut Vec<Note>) -> Outcome<Value>
         return Err(Failure::input(format!("{}: found no mapped texel, expected skin", a.albedo.display())));
     }
     let lookup = SkinModel::new(&ChromophoreModel::default()).bake(LOOKUP_SIZE, LOOKUP_SIZE);
-    let maps = chromophores::convert(&albedo, &mask, &lookup, a.threshold)?;
+    let options = chromophores::Options { gain: a.gain, threshold: a.threshold };
+    let maps = chromophores::convert(&albedo, &mask, &lookup, &options)?;
     let mut report = serde_json::to_value(maps.summary).map_err(Failure::job)?;
+    report["exposure"] = serde_json::to_value(maps.exposure).map_err(Failure::job)?;
+    let about = a.albedo.display().to_string();
+    if a.gain.is_none() {
+        notes.push(Note::new(&about, format!("the exposure was estimated: gain {}", maps.exposure)));
+    }
+    if maps.summary.is_painted {
+        let message = "hardly a texel has a colour of skin: all have the blood and the pigment of one colour";
+        notes.push(Note::new(&about, message));
+    }
     let Some(mut receiver) = receiver else {
         output::folder(&a.to.output)?;
         for (name, map) in
@@ -83,6 +102,15 @@ pub(super) fn run(a: &ChromophoresArgs, notes: &mut Vec<Note>) -> Outcome<Value>
     };
     let origin = a.to.origin(format!("rubor maps chromophores of {}", file_name(&a.albedo)));
     into_head::put_chromophores(&mut receiver.head, maps.melanin, maps.hemoglobin, &origin)?;
+    if a.no_color {
+        receiver.head.maps.albedo = None;
+    } else {
+        if receiver.head.maps.hair.is_some() {
+            let message = "the hair map of the head and its grown brows are left out: the colour of its skin has its own hair";
+            notes.push(Note::new(&about, message));
+        }
+        into_head::put_albedo(&mut receiver.head, filled(albedo, &mask), &origin)?;
+    }
     a.to.write(&receiver)?;
     report["written"] = json!(a.to.output);
     Ok(report)

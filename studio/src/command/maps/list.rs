@@ -35,6 +35,7 @@ pub(crate) struct ExtractArgs {
 /// Every map with its name; distributions and zones are called as told.
 fn named<'a>(maps: &'a SkinMaps, distributions: &[String], zones: &[String]) -> Vec<(String, &'a Map)> {
     let single = [
+        ("albedo", &maps.albedo),
         ("melanin", &maps.melanin),
         ("hemoglobin", &maps.hemoglobin),
         ("neutral_mean", &maps.hemoglobin_mean),

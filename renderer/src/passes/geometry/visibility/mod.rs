@@ -7,8 +7,8 @@
 //! Theory: Burns and Hunt 2013, "The visibility buffer". The only rasterised pass of the frame that covers the head;
 //! its fragment shader stores one integer, everything else is compute (ARCHITECTURE.md has the measurement). Where
 //! compute is faster at that too, `raster` takes its place.
-//! Parts that keep a material with holes (alpha mask, or alpha that is cut at one half) are drawn after the others by a
-//! pipeline that reads their alpha; heads without such parts do not have it.
+//! Parts with an authored material that has holes (alpha mask, alpha that blends where it is nearly 1, one side) are drawn
+//! after the others by a pipeline that reads their alpha; heads without such parts do not have it.
 //! Reversed infinite depth keeps 24 bits at any distance (Lapidous and Jiao 1999).
 
 use std::sync::OnceLock;
