@@ -268,7 +268,7 @@ pub(crate) fn finish_with(
     });
     console::notes(&layout.collect::<Vec<_>>());
     let mut notes = Vec::new();
-    common.scan.put_color(&mut head, &mut notes)?;
+    common.scan.put_color(&mut head, common.gain, &mut notes)?;
     let chromophores = chromophores::Options { gain: common.gain, ..chromophores::Options::default() };
     let options_of_color = own_color::Options { chromophores, insisted };
     let about = path.display().to_string();

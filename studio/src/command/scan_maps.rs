@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use rubor::notes::Note;
 use rubor::{Failure, Outcome};
-use rubor_assets::convert::chromophores::{self, AlbedoEncoding, DEFAULT_GAMUT_THRESHOLD};
+use rubor_assets::convert::chromophores::{self, AlbedoEncoding};
 use rubor_assets::convert::displacement;
-use rubor_assets::convert::into_head::{Origin, put_chromophores, put_slopes, put_specular};
+use rubor_assets::convert::into_head::{Origin, put_albedo, put_chromophores, put_slopes, put_specular};
 use rubor_assets::convert::normals::{self, GreenAxis};
 use rubor_assets::convert::skin_texels::{SkinTexels, require_layout};
 use rubor_assets::image_io::{LoadedImage, Purpose, ReadOptions, load_image_with};
@@ -28,9 +28,6 @@ pub(crate) struct ScanMaps {
     /// Colour of the skin as an image: an albedo texture or a cross-polarised photograph
     #[arg(long, value_name = "IMAGE")]
     albedo: Option<PathBuf>,
-    /// Factor from the values of the albedo to reflectance [default: 1]
-    #[arg(long, requires = "albedo")]
-    gain: Option<f32>,
     /// Normal map of the skin, tangent space, green upwards
     #[arg(long, value_name = "IMAGE")]
     normal: Option<PathBuf>,
@@ -58,13 +55,13 @@ impl ScanMaps {
     }
 
     /// Puts the colour into a head. The part that the maps lie on becomes skin where none is.
-    pub(crate) fn put_color(&self, head: &mut Head, notes: &mut Vec<Note>) -> Outcome {
+    pub(crate) fn put_color(&self, head: &mut Head, gain: Option<f32>, notes: &mut Vec<Note>) -> Outcome {
         if self.is_empty() {
             return Ok(());
         }
         make_skin(head, notes)?;
         match &self.albedo {
-            Some(file) => self.put_albedo(head, file, notes),
+            Some(file) => self.put_albedo(head, gain, file, notes),
             None => Ok(()),
         }
     }
@@ -78,10 +75,9 @@ impl ScanMaps {
         }
     }
 
-    fn put_albedo(&self, head: &mut Head, file: &Path, notes: &mut Vec<Note>) -> Outcome {
+    fn put_albedo(&self, head: &mut Head, gain: Option<f32>, file: &Path, notes: &mut Vec<Note>) -> Outcome {
         let image = load(file, Purpose::Values, notes)?;
-        let albedo =
-            chromophores::linear_albedo(&image, AlbedoEncoding::Automatic, self.gain.unwrap_or(1.0))?;
+        let albedo = chromophores::linear_albedo(&image, AlbedoEncoding::Automatic)?;
         let skin = SkinTexels::new(head, albedo.width, albedo.height).mask();
         let mask = image.mask();
         let not_black = |(m, c): (&bool, &[f32])| *m && c.iter().any(|v| *v > 0.0);
@@ -91,20 +87,27 @@ impl ScanMaps {
         };
         require_layout(&file.display().to_string(), &data, &skin)?;
         let lookup = SkinModel::new(&ChromophoreModel::default()).bake(LOOKUP_SIZE, LOOKUP_SIZE);
-        let maps = chromophores::convert(&albedo, &mask.and(&skin), &lookup, DEFAULT_GAMUT_THRESHOLD)?;
+        let mask = mask.and(&skin);
+        let options = chromophores::Options { gain, ..chromophores::Options::default() };
+        let maps = chromophores::convert(&albedo, &mask, &lookup, &options)?;
         let found = &maps.summary;
         let beyond = found.out_of_gamut_texels as f64 / found.mapped_texels.max(1) as f64;
         notes.push(Note::new(
             file.display().to_string(),
             format!(
-                "melanin {:.3} and hemoglobin {:.3} in the mean; {:.1} % of the skin has colours that skin alone does not \
-                 make (hair, make-up, light in the picture)",
+                "melanin {:.3} and hemoglobin {:.3} in the mean, gain {}; {:.1} % of the skin has colours that skin alone \
+                 does not make (hair, make-up, light in the picture): they stay, with the blood of the skin around",
                 found.mean_melanin,
                 found.mean_hemoglobin,
+                maps.exposure,
                 100.0 * beyond
             ),
         ));
-        put_chromophores(head, maps.melanin, maps.hemoglobin, &origin("albedo", file))?;
+        let origin = origin("albedo", file);
+        put_chromophores(head, maps.melanin, maps.hemoglobin, &origin)?;
+        let mut albedo = albedo;
+        fill_unmapped(&mut albedo, &mask);
+        put_albedo(head, albedo, &origin)?;
         Ok(())
     }
 
