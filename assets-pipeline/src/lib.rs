@@ -35,6 +35,8 @@ pub mod facial_appearance;
 pub mod files;
 pub mod image_io;
 pub mod import;
+pub mod landmarks;
 pub mod notes;
+pub mod parts;
 pub mod poly;
 pub mod synthesize;
