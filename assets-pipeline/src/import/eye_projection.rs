@@ -9,19 +9,19 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) use rubor_rig::head::LIMBUS_UV;
 
 /// Radius of the iris where it meets the white, metres (visible iris diameter 11.8 mm).
-pub(super) const LIMBUS_RADIUS: f32 = 0.0059;
+pub(crate) const LIMBUS_RADIUS: f32 = 0.0059;
 
 /// Where an eye is and looks at rest.
-pub(super) struct EyeProjection {
-    pub(super) center: Vec3,
-    pub(super) axis: Vec3,
+pub(crate) struct EyeProjection {
+    pub(crate) center: Vec3,
+    pub(crate) axis: Vec3,
     limbus: f32,
 }
 
 impl EyeProjection {
     /// From the points of the outer surface. The ball is fitted to what lies away from the front, the axis to what
     /// stands out from the ball there, the cornea; an eye without one looks along +Z.
-    pub(super) fn fit(points: &[Vec3]) -> Self {
+    pub(crate) fn fit(points: &[Vec3]) -> Self {
         let (center, _) = fit_sphere(points);
         let behind: Vec<Vec3> =
             points.iter().copied().filter(|p| (*p - center).angle_between(Vec3::Z) > 0.9).collect();
@@ -35,7 +35,7 @@ impl EyeProjection {
     }
 
     /// Texture coordinate of a rest position.
-    pub(super) fn uv(&self, p: Vec3) -> Vec2 {
+    pub(crate) fn uv(&self, p: Vec3) -> Vec2 {
         let d = p - self.center;
         let right = (Vec3::X - self.axis * self.axis.x).normalize_or(Vec3::X);
         let down = -self.axis.cross(right);
@@ -46,12 +46,12 @@ impl EyeProjection {
 }
 
 /// Angle of the limbus from the pupil axis on a ball of a radius in metres.
-pub(super) fn limbus_angle(radius: f32) -> f32 {
+pub(crate) fn limbus_angle(radius: f32) -> f32 {
     (LIMBUS_RADIUS / radius.max(1e-6)).clamp(0.05, 0.9).asin()
 }
 
 /// Distance from (0.5, 0.5): proportional to the angle up to the limbus and from there to 0.5 at the back.
-pub(super) fn uv_radius(theta: f32, limbus: f32) -> f32 {
+pub(crate) fn uv_radius(theta: f32, limbus: f32) -> f32 {
     if theta <= limbus {
         LIMBUS_UV * theta / limbus
     } else {
@@ -60,7 +60,7 @@ pub(super) fn uv_radius(theta: f32, limbus: f32) -> f32 {
 }
 
 /// Least squares sphere: |p|^2 = 2 c.p + (r^2 - |c|^2), linear in c and the bracket.
-pub(super) fn fit_sphere(points: &[Vec3]) -> (Vec3, f32) {
+pub(crate) fn fit_sphere(points: &[Vec3]) -> (Vec3, f32) {
     let mean = points.iter().sum::<Vec3>() / points.len().max(1) as f32;
     let local: Vec<Vec3> = points.iter().map(|p| *p - mean).collect();
     let a = DMatrix::from_fn(local.len(), 4, |i, j| if j < 3 { 2.0 * f64::from(local[i][j]) } else { 1.0 });

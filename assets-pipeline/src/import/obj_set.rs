@@ -30,6 +30,7 @@ use crate::check::list;
 use crate::convert::occlusion;
 use crate::error::ImportError;
 use crate::notes::{Note, Notes};
+use crate::parts;
 use crate::poly::{PolyMesh, Shape, build_head};
 
 /// Offsets up to this part of the head's height are dropped: 0.007 mm on an adult head, below what a map texel spans.
@@ -221,20 +222,23 @@ pub fn read(options: &Options) -> Result<ImportedSet, ImportError> {
     }
 
     split_lining(&mut mesh);
-    let mut parts: Vec<(String, Material)> =
+    let mut materials: Vec<(String, Material)> =
         mesh.groups.iter().map(|g| (g.clone(), material_of(g))).collect();
-    let eyes = project_eyes(&mut mesh, &mut parts);
-    tiles::pack(&mut mesh, &parts);
+    let eyes = project_eyes(&mut mesh, &mut materials);
+    tiles::pack(&mut mesh, &materials);
     for _ in 0..options.subdivide {
         (mesh, shapes) = mesh.subdivide(&shapes);
     }
-    let parts: Vec<(&str, &str, Material)> =
-        parts.iter().map(|(g, m)| (g.as_str(), g.as_str(), *m)).collect();
+    let groups: Vec<(&str, &str, Material)> =
+        materials.iter().map(|(g, m)| (g.as_str(), g.as_str(), *m)).collect();
     let height = mesh.points.iter().map(|p| p.y).fold(f32::MIN, f32::max)
         - mesh.points.iter().map(|p| p.y).fold(f32::MAX, f32::min);
-    let (mut head, _) = build_head(&mesh, &shapes, &parts, OFFSET_THRESHOLD * height);
+    let (mut head, _) = build_head(&mesh, &shapes, &groups, OFFSET_THRESHOLD * height);
     head.name = folder.file_name().map_or_else(|| file_stem(&neutral), |n| n.to_string_lossy().into_owned());
     head.landmarks = landmarks(folder, &mesh, &eyes)?;
+    for note in parts::fit_coordinates(&mut head, false) {
+        note.places.iter().for_each(|place| notes.add(&note.message, place.as_str()));
+    }
     Library::read(folder, &libraries, &mut notes).give(&mut head, &mut notes);
     let source = format!("{} and {} shapes, OBJ", file_name(&neutral), shapes.len());
     for of in ["geometry", "shapes"] {

@@ -36,10 +36,11 @@ use thiserror::Error;
 
 use brows::Hairs;
 use chromophores::Chromophores;
-use face_space::FaceSpace;
+pub(crate) use face_space::FaceSpace;
 use regions::Regions;
 use relief::Relief;
 pub use strands::grow_lashes;
+pub(crate) use strands::grow_lashes_along;
 use surface::SkinSurface;
 use wrinkles::Wrinkles;
 
@@ -218,7 +219,7 @@ fn synthesize_with(
     let half_relief = Relief::new(seed, texel_mm, options.age_years);
     let half_hairs = Hairs::new(options, texel_mm);
     let mut broad = half.bake_with::<5>(&[2, 2, 1], step, |site| {
-        let r = Regions::at(site.place);
+        let r = Regions::of(site);
         let [x, y] =
             if Wrinkles::reach(site.place) { site.slopes(wrinkles.gradient(site.place)) } else { [0.0; 2] };
         let hair = half_hairs.cover(site.place, &r);
@@ -238,7 +239,7 @@ fn synthesize_with(
     let relief = Relief::new(seed, texel_mm, options.age_years);
     let hairs = Hairs::new(options, texel_mm);
     let mut detailed = full.bake_with::<5>(&[1, 1, 2, 1], step, |site| {
-        let r = Regions::at(site.place);
+        let r = Regions::of(site);
         let relief = relief.sample(site, &r);
         let hair = hairs.cover(site.place, &r);
         let hollow = r.hollow(site.open);
@@ -262,7 +263,7 @@ fn synthesize_with(
     let radius_px = (STATISTICS_RADIUS_MM / texel_mm).round().clamp(2.0, 64.0) as u32;
     let (hemoglobin_mean, distributions) =
         expressions::distributions(&coarse, radius_px, DISTRIBUTION_RESOLUTION, seed, |site| {
-            let r = Regions::at(site.place);
+            let r = Regions::of(site);
             let (mean, value) = chromophores.hemoglobin_with_mean(site.place, &r, r.hollow(site.open));
             (r, mean, value)
         })?;

@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::face_space::plan;
 use super::noise::smoothstep;
+use super::surface::Site;
 
 /// Weights of the regions at one point.
 #[derive(Clone, Copy, Debug, Default)]
@@ -200,8 +201,22 @@ fn ear_weight(c: Vec3) -> f32 {
 }
 
 impl Regions {
+    /// Weights at a point of the skin. What lies at the depth of the lips' lining belongs to it only where it turns away
+    /// from the front or is enclosed: the skin beside a flat chin lies as deep.
+    pub(crate) fn of(site: &Site) -> Self {
+        let turned = smoothstep(0.45, 0.1, site.normal.z);
+        let enclosed = smoothstep(0.62, 0.42, site.open);
+        Self::with(site.place, turned.max(enclosed))
+    }
+
     /// Weights at a canonical position.
+    #[cfg(test)]
     pub(crate) fn at(place: Vec3) -> Self {
+        Self::with(place, 1.0)
+    }
+
+    /// Weights at a canonical position; `lining` is how much it may belong to the lining of the lips.
+    fn with(place: Vec3, lining: f32) -> Self {
         let p = plan(place);
         let c = Vec3::new(place.x.abs(), place.y, place.z);
         let s = p.x.abs();
@@ -217,7 +232,8 @@ impl Regions {
         let bottom = through(&LIP_BOTTOM, s);
         let lip_depth = (top - p.y).min(p.y - bottom).min((24.6 - s) * 0.8);
         let mouth_height = smoothstep(-100.0, -92.0, p.y) * smoothstep(-50.0, -57.0, p.y);
-        let behind_lips = mouth_height
+        let behind_lips = lining
+            * mouth_height
             * smoothstep(30.0, 27.0, s)
             * smoothstep(81.0, 76.0, c.z + 0.011 * (c.x - 8.0).max(0.0).powi(2));
         let lips = (front * smoothstep(-0.7, 0.6, lip_depth)).max(behind_lips);
@@ -330,6 +346,17 @@ mod tests {
         for name in ["pronasale", "alare", "subnasale", "cheek", "ear"] {
             assert!(Regions::at(canonical(name)).hollow(0.5) < 0.35, "{name}");
         }
+    }
+
+    #[test]
+    fn skin_beside_a_flat_chin_is_no_lining() {
+        // Below and beside the corner of the mouth, as deep as the lining behind the lips.
+        let place = Vec3::new(23.0, -88.0, 74.0);
+        let facing = |normal: Vec3, open| Regions::of(&Site::at(place, normal.normalize(), open));
+        let out = facing(Vec3::new(0.5, -0.1, 0.8), 0.95);
+        assert!(out.lips < 0.05 && out.inner < 0.05, "{out:?}");
+        assert!(facing(Vec3::new(0.2, 0.1, -0.9), 0.95).inner > 0.5, "it turns to the teeth");
+        assert!(facing(Vec3::new(0.5, -0.1, 0.8), 0.2).inner > 0.5, "it is enclosed");
     }
 
     #[test]

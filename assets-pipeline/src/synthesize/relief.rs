@@ -110,7 +110,9 @@ impl Relief {
         let dry = (1.0 - r.lips.max(r.inner)).max(0.0);
         // The skin of the ear is drawn tight over cartilage, and the warp is loose there.
         let hollow = r.hollow(site.open);
-        let skin = dry * (1.0 - 0.75 * r.lids) * (1.0 - 0.9 * r.ear) * (1.0 - 0.8 * hollow);
+        // Where the texture is much coarser than on the face, pores and furrows would alias into scales.
+        let held = smoothstep(2.2, 1.5, site.coarseness);
+        let skin = held * dry * (1.0 - 0.75 * r.lids) * (1.0 - 0.9 * r.ear) * (1.0 - 0.8 * hollow);
         let tension = tension(p, r);
         let mut gradient = Vec3::ZERO;
         let mut cavity = 0.0;
@@ -120,7 +122,8 @@ impl Relief {
             (1.0 - 0.5 * r.forehead) * (1.0 - 0.6 * r.temple) * (1.0 - 0.85 * r.ear) * (1.0 - 0.6 * r.scalp);
         for (wavelength, height_mm, seed) in [(8.0, 0.030, 1u32), (2.7, 0.009, 2)] {
             let g = gradient_noise(c / wavelength, self.seed ^ seed).1;
-            gradient += g * (height_mm * self.coarseness * dry * tight / wavelength);
+            let held = self.held(0.5 * wavelength / site.coarseness.max(1.0));
+            gradient += g * (height_mm * self.coarseness * dry * tight * held / wavelength);
         }
 
         if skin > 0.01 {
@@ -184,7 +187,7 @@ impl Relief {
             (r.neck, -24.0, 7.0, 2.0, 0.007, 27),
         ];
         for (weight, degrees, along, across, height_mm, seed) in fine {
-            let strength = weight * dry * self.held(0.6 * across);
+            let strength = weight * dry * self.held(0.6 * across / site.coarseness.max(1.0));
             if strength > 0.01 {
                 let mirrored = if p.x < 0.0 { -degrees } else { degrees };
                 let (_, g) = grooved(line_noise(c, mirrored, along, across, self.seed ^ seed), 0.06);

@@ -18,6 +18,7 @@ use super::Options;
 use super::brows::brow_strokes;
 use super::face_space::{FaceSpace, plan};
 use super::noise::Stream;
+use crate::parts::is_long;
 
 /// Width of a ribbon at its root, mm. Terminal hair is 0.06 to 0.1 mm thick; brows and lashes look fuller than single
 /// hairs, and these are fewer.
@@ -47,6 +48,13 @@ struct Chart {
 }
 
 impl Chart {
+    /// Length from root to tip in the middle of a card.
+    fn length(&self, points: &[Vec3]) -> f32 {
+        let at = |v: f32| Some(self.at(Vec2::new(0.5, v))?.of(points));
+        let knots: Option<Vec<Vec3>> = (0..=8).map(|i| at(0.01 + 0.98 * i as f32 / 8.0)).collect();
+        knots.map_or(0.0, |k| k.windows(2).map(|w| w[0].distance(w[1])).sum())
+    }
+
     fn at(&self, p: Vec2) -> Option<Anchor> {
         self.triangles.iter().find_map(|(points, [a, b, c])| {
             let area = (*b - *a).perp_dot(*c - *a);
@@ -111,6 +119,15 @@ pub(super) fn grow_brows(head: &mut Head, options: &Options) {
 /// Replaces lash cards (parts of material lash with u within 0 to 1) by single hairs in small tufts, the lower ones
 /// short and sparse.
 pub fn grow_lashes(head: &mut Head) {
+    grow_swept_lashes(head, |_, _| 1.0);
+}
+
+/// As [`grow_lashes`], of cards of other programs: long ones have their sweep already.
+pub(crate) fn grow_lashes_along(head: &mut Head) {
+    grow_swept_lashes(head, |head, chart| if is_long(chart.length(&head.mesh.points)) { 0.15 } else { 1.0 });
+}
+
+fn grow_swept_lashes(head: &mut Head, sweep: impl Fn(&Head, &Chart) -> f32) {
     let mut grown = Vec::new();
     for (index, part) in head.mesh.parts.iter().enumerate() {
         let mut chart = Chart::default();
@@ -121,7 +138,8 @@ pub fn grow_lashes(head: &mut Head) {
         let mut uvs = chart.triangles.iter().flat_map(|(_, uv)| uv);
         let lash = LASHES.iter().find(|l| part.name.ends_with(l.0));
         if let (Material::Lash, Some((name, count)), true) = (part.material, lash, uvs.all(|c| c.x <= 1.0)) {
-            grown.push((index, part.name.clone(), lash_strands(&chart, *count, *name == "upper")));
+            let sweep = sweep(head, &chart);
+            grown.push((index, part.name.clone(), lash_strands(&chart, *count, *name == "upper", sweep)));
         }
     }
     for (_, name, strands) in &grown {
@@ -130,7 +148,7 @@ pub fn grow_lashes(head: &mut Head) {
     remove_parts(head, |index, _| grown.iter().any(|g| g.0 == index));
 }
 
-fn lash_strands(chart: &Chart, count: usize, upper: bool) -> Vec<Strand> {
+fn lash_strands(chart: &Chart, count: usize, upper: bool, sweep: f32) -> Vec<Strand> {
     let mut stream = Stream::new(0x1a54 + u32::from(upper));
     let mut strands = Vec::new();
     for i in 0..count {
@@ -142,7 +160,7 @@ fn lash_strands(chart: &Chart, count: usize, upper: bool) -> Vec<Strand> {
         // Shorter towards the inner corner, whichever end that is, and none at the very ends.
         let ends = (4.0 * u * (1.0 - u)).powf(0.35);
         // Cards stand straight out and are short; real lashes sweep up, or down, by a few millimetres.
-        let curl = if upper { Vec3::new(0.0, 0.0042, 0.0012) } else { Vec3::new(0.0, -0.0010, 0.0006) };
+        let curl = sweep * if upper { Vec3::new(0.0, 0.0042, 0.0012) } else { Vec3::new(0.0, -0.0010, 0.0006) };
         let knots = [0.0f32, 0.3, 0.62, 1.0].map(|t| {
             let at =
                 Vec2::new((u + lean * t * t).clamp(0.002, 0.998), (length * ends * t).clamp(0.002, 0.998));

@@ -31,6 +31,8 @@ struct Corner {
     along_bitangent: Vec3,
     /// Ambient visibility at rest, 0 to 1.
     open: f32,
+    /// Edge of a texel about here as part of the face's typical one.
+    coarseness: f32,
 }
 
 /// Skin triangles of a head in canonical space.
@@ -51,11 +53,20 @@ pub(crate) struct Site {
     pub uv: Vec2,
     /// Ambient visibility at rest, 0 to 1; 1 where the head does not say.
     pub open: f32,
+    /// Edge of a texel about here as part of the typical one of the face: over 1 where the texture is coarser.
+    pub coarseness: f32,
     along_tangent: Vec3,
     along_bitangent: Vec3,
 }
 
 impl Site {
+    /// A place without a texture frame.
+    #[cfg(test)]
+    pub(crate) fn at(place: Vec3, normal: Vec3, open: f32) -> Self {
+        let (along_tangent, along_bitangent) = (Vec3::X, Vec3::Y);
+        Self { place, normal, uv: Vec2::ZERO, open, coarseness: 1.0, along_tangent, along_bitangent }
+    }
+
     /// Slopes (n_x/n_z, n_y/n_z) of the surface displaced by a height field (mm) with this gradient in canonical
     /// space. The displaced normal is n - grad h on the surface (Mikkelsen 2010), so the slopes are the negated
     /// derivatives along the texture frame.
@@ -85,10 +96,11 @@ impl SkinSurface {
                 along_tangent: derivative(tangent),
                 along_bitangent: derivative(bitangent),
                 open: mesh.occlusion.get(vertex.point as usize).copied().unwrap_or(1.0),
+                coarseness: 1.0,
             }
         };
         let mut used = vec![None; mesh.vertices.len()];
-        let mut triangles = Vec::new();
+        let (mut triangles, mut points) = (Vec::new(), Vec::new());
         for part in mesh.parts.iter().filter(|p| p.material == Material::Skin) {
             for t in &mesh.triangles[part.triangles.start as usize..part.triangles.end as usize] {
                 let corners = t.map(|v| *used[v as usize].get_or_insert_with(|| corner(v)));
@@ -96,6 +108,7 @@ impl SkinSurface {
                     |c: &Corner| (-1e-3..=1.001).contains(&c.uv.x) && (-1e-3..=1.001).contains(&c.uv.y);
                 if corners.iter().all(inside) && uv_area(&corners).abs() > 1e-12 {
                     triangles.push(corners);
+                    points.push(t.map(|v| mesh.vertices[v as usize].point));
                 }
             }
         }
@@ -106,6 +119,10 @@ impl SkinSurface {
             .collect();
         extents.sort_by(f32::total_cmp);
         let face_extent_mm = extents.get(extents.len() / 2).copied().unwrap_or(350.0);
+        let coarseness = coarseness(&triangles, &points, mesh.points.len(), face_extent_mm);
+        for (t, points) in triangles.iter_mut().zip(&points) {
+            t.iter_mut().zip(points).for_each(|(c, p)| c.coarseness = coarseness[*p as usize]);
+        }
         Self { triangles, face_extent_mm }
     }
 
@@ -145,6 +162,40 @@ impl SkinSurface {
         });
         Coverage { surface: self, resolution, shown }
     }
+}
+
+/// Edge of a texel at each point as part of the typical one: the coarsest about it, blended over a few edges, so that
+/// what a coarse part of the texture leaves out fades towards the border of a fine one.
+fn coarseness(triangles: &[[Corner; 3]], points: &[[u32; 3]], count: usize, typical_mm: f32) -> Vec<f32> {
+    const BLENDED_EDGES: usize = 6;
+    let mut values = vec![0.0f32; count];
+    for (t, points) in triangles.iter().zip(points) {
+        // Of islands that are squeezed one way, that way counts.
+        let longest = (0..3)
+            .map(|k| {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                a.place.distance(b.place) / a.uv.distance(b.uv).max(1e-9)
+            })
+            .fold(0.0, f32::max);
+        let value = longest.min(1.5 * (area(t) / uv_area(t).abs()).sqrt()) / typical_mm;
+        points.iter().for_each(|p| values[*p as usize] = values[*p as usize].max(value));
+    }
+    for _ in 0..BLENDED_EDGES {
+        let mut sums = vec![(0.0f32, 0.0f32); count];
+        for [a, b, c] in points {
+            for (p, q) in [(*a, *b), (*b, *c), (*c, *a)] {
+                let (u, v) = (values[p as usize], values[q as usize]);
+                sums[p as usize] = (sums[p as usize].0 + v, sums[p as usize].1 + 1.0);
+                sums[q as usize] = (sums[q as usize].0 + u, sums[q as usize].1 + 1.0);
+            }
+        }
+        for (value, (sum, n)) in values.iter_mut().zip(sums) {
+            if n > 0.0 {
+                *value = value.max(0.5 * *value + 0.5 * sum / n);
+            }
+        }
+    }
+    values
 }
 
 /// Writes a triangle (corners in texels) into the rows of a band, where it is inside or nearer than the stored one.
@@ -300,6 +351,7 @@ fn site_at(t: &[Corner; 3], p: Vec2) -> Site {
         normal: normal.normalize_or_zero(),
         uv: p,
         open: t[0].open * (1.0 - w1 - w2) + t[1].open * w1 + t[2].open * w2,
+        coarseness: t[0].coarseness * (1.0 - w1 - w2) + t[1].coarseness * w1 + t[2].coarseness * w2,
         along_tangent,
         along_bitangent,
     }

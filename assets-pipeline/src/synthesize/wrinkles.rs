@@ -29,6 +29,9 @@ pub(crate) const ZONES: [&str; 12] = [
 /// Step of the finite differences, mm: well under the width of the finest groove.
 const STEP_MM: f32 = 0.12;
 
+/// Most that one side of the forehead is made shallower and the other deeper.
+const MAX_BALANCE: f32 = 0.4;
+
 /// Course of the nasolabial fold on the left, plan mm: from the wing of the nose past the corner of the mouth.
 const NASOLABIAL: [[f32; 2]; 6] =
     [[16.5, -36.5], [20.5, -43.5], [24.8, -51.5], [28.6, -60.5], [30.8, -70.0], [31.0, -80.0]];
@@ -51,6 +54,8 @@ pub(crate) struct Wrinkles {
     grooves: Vec<Groove>,
     lines: Lines,
     seed: u32,
+    /// Factor of the forehead's left side over the mean of both, less 1: its rows break at random places.
+    forehead_balance: f32,
 }
 
 /// Collects grooves while they are drawn.
@@ -88,7 +93,33 @@ impl Wrinkles {
             nasolabial(&mut pen, side);
         }
         mentolabial(&mut pen);
-        Self { grooves: pen.grooves, lines: Lines::new(pen.lines, 3.0), seed }
+        let lines = Lines::new(pen.lines, 3.0);
+        let mut wrinkles = Self { grooves: pen.grooves, lines, seed, forehead_balance: 0.0 };
+        // Two rounds: the sides blend into each other about the middle.
+        for _ in 0..2 {
+            let [left, right] = wrinkles.forehead_strength();
+            let sum = left + right;
+            if sum > 0.0 {
+                wrinkles.forehead_balance =
+                    (wrinkles.forehead_balance + (right - left) / sum).clamp(-MAX_BALANCE, MAX_BALANCE);
+            }
+        }
+        wrinkles
+    }
+
+    /// Root mean square height of the forehead's left and right side, mm.
+    fn forehead_strength(&self) -> [f32; 2] {
+        [1.0, -1.0].map(|side| {
+            let (mut sum, mut count) = (0.0f32, 0.0f32);
+            for i in 0..44 {
+                for j in 0..40 {
+                    let p = Vec2::new(side * (3.0 + 1.05 * i as f32), 33.0 + 0.85 * j as f32);
+                    sum += self.height_on_plan(p).powi(2);
+                    count += 1.0;
+                }
+            }
+            (sum / count).sqrt()
+        })
     }
 
     /// Height of the wrinkled skin over the smooth one at full strength, mm.
@@ -109,6 +140,10 @@ impl Wrinkles {
             let length = self.lines.line(n.line).length_mm();
             height += groove.height_mm(n.distance_mm, n.along_mm, length, self.seed);
         });
+        if p.y > 28.0 {
+            let share = smoothstep(28.0, 33.0, p.y) * (2.0 * smoothstep(-18.0, 18.0, p.x) - 1.0);
+            height *= 1.0 + self.forehead_balance * share;
+        }
         height + self.chin_dimples_mm(p)
     }
 
@@ -483,6 +518,14 @@ mod tests {
             }
         }
         assert_eq!(seen, [true; 12], "every zone has a core");
+    }
+
+    #[test]
+    fn both_sides_of_the_forehead_are_as_deep_for_every_person() {
+        for seed in 0..12 {
+            let [left, right] = Wrinkles::new(seed).forehead_strength();
+            assert!((left / right - 1.0).abs() < 0.06, "seed {seed}: {left} and {right} mm");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use clap::{Subcommand, ValueEnum};
 use rubor_assets::convert::{chromophores, own_color};
 use rubor_assets::export::gltf::MapEncodings;
-use rubor_assets::{export, import, synthesize};
+use rubor_assets::{export, import, landmarks, parts, synthesize};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::timeline::Sequence;
@@ -73,6 +73,13 @@ pub(crate) struct Common {
     /// Factor from the values of skin textures to reflectances, for their blood: their colour stays [default: estimated]
     #[arg(long)]
     gain: Option<f32>,
+    /// Landmarks of the face (.json): name to vertex, to place, or to pixel of the picture of --landmarks-picture
+    /// [default: found on the surface]
+    #[arg(long, value_name = "FILE")]
+    landmarks: Option<PathBuf>,
+    /// Also write a picture of the head from the front with its landmarks numbered (.png)
+    #[arg(long, value_name = "FILE")]
+    landmarks_picture: Option<PathBuf>,
     /// Smaller file: maps as JPEG, no normals of shapes for other viewers
     #[arg(long)]
     small: bool,
@@ -245,6 +252,74 @@ fn write_sequence(sequence: Option<&Sequence>, source: &Path, path: &Path) -> Ou
     Ok(())
 }
 
+/// Finds where the face is, unless the head says so itself, and what parts are that no name tells.
+fn place_face(head: &mut Head, common: &Common, about: &str) -> Outcome {
+    let note = |message: String| console::notes(&[Note::new(about, message)]);
+    let is_known = synthesize::finds_face(head);
+    if is_known && common.landmarks.is_none() && common.landmarks_picture.is_none() {
+        return Ok(());
+    }
+    let mut fit = landmarks::find(head);
+    if let Some(file) = &common.landmarks {
+        let text = std::fs::read_to_string(file).map_err(|e| Failure::read(file, e))?;
+        let given = landmarks::read_given(&text, head, fit.as_ref())
+            .map_err(|e| Failure::input(format!("{}: {e}", file.display())))?;
+        fit = landmarks::find_with(head, &given);
+        head.landmarks.extend(given);
+    }
+    let Some(fit) = fit else { return Ok(()) };
+    let percent = (100.0 * fit.confidence).floor();
+    if fit.confidence >= landmarks::TRUSTED {
+        if !is_known {
+            note(format!("a face was found on the surface (confidence {percent} %), landmarks are placed by it"));
+        }
+        if fit.turned_degrees > MOST_TURNED_DEGREES {
+            let angle = fit.turned_degrees.round();
+            note(format!("the face is turned by {angle} degrees from upright and looking along +Z: pictures show it so"));
+        }
+        let size = fit.size();
+        if !(LIKELY_SIZES.0..LIKELY_SIZES.1).contains(&size) {
+            note(format!("the face is {size:.2} times as large as an adult's: scattering and relief are in millimetres"));
+        }
+        fit.complete(head);
+        let is_given = |name: &str| common.parts.iter().any(|(given, _)| given == name);
+        let said: Vec<Note> =
+            parts::recognise(head, &fit, is_given).iter().map(|n| Note::new(about, n.to_string())).collect();
+        console::notes(&said);
+        console::notes(
+            &parts::fit_coordinates(head, true).iter().map(|n| Note::new(about, n.to_string())).collect::<Vec<_>>(),
+        );
+    } else if !is_known {
+        note(format!(
+            "no face was found for certain (confidence {percent} %: {}): `--landmarks-picture OUT.png` shows the best guess, \
+             `--landmarks FILE` says where landmarks are",
+            fit.reason
+        ));
+    }
+    if let Some(file) = &common.landmarks_picture {
+        let shown = if head.landmarks.is_empty() { &fit.landmarks } else { &head.landmarks };
+        if let Some(picture) = landmarks::draw_picture(head, Some(&fit), shown) {
+            write_picture(&picture, file)?;
+        }
+    }
+    Ok(())
+}
+
+/// Angle from which a face is said to look elsewhere.
+const MOST_TURNED_DEGREES: f32 = 25.0;
+/// Sizes of faces of children, adults and most stylised characters against the mean adult's.
+const LIKELY_SIZES: (f32, f32) = (0.6, 1.6);
+
+fn write_picture(picture: &landmarks::Picture, file: &Path) -> Outcome {
+    let image = image::RgbImage::from_raw(picture.width, picture.height, picture.rgb.clone());
+    let Some(image) = image else { return Err(Failure::input(format!("{}: no picture", file.display()))) };
+    rubor::output::save_picture(file, &image)?;
+    let names: Vec<String> =
+        picture.names.iter().enumerate().map(|(i, name)| format!("{} {name}", i + 1)).collect();
+    say!("{}: {}", file.display(), names.join(", "));
+    Ok(())
+}
+
 /// Adds maps where there are none and writes the head with the default rig.
 fn finish(head: Head, options: synthesize::Options, common: &Common) -> Outcome {
     finish_with(head, &Rig::default_rig()?, options, common)
@@ -267,6 +342,7 @@ pub(crate) fn finish_with(
         Note::new(path.display().to_string(), f.message + &fix)
     });
     console::notes(&layout.collect::<Vec<_>>());
+    place_face(&mut head, common, &path.display().to_string())?;
     let mut notes = Vec::new();
     common.scan.put_color(&mut head, common.gain, &mut notes)?;
     let chromophores = chromophores::Options { gain: common.gain, ..chromophores::Options::default() };
