@@ -171,6 +171,17 @@ impl AuthoredMaterial {
         ]
     }
 
+    /// The same as places, in the same order.
+    pub fn textures_mut(&mut self) -> [&mut Option<AuthoredTexture>; 5] {
+        [
+            &mut self.base_color_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.normal_texture,
+            &mut self.occlusion_texture,
+            &mut self.emission_texture,
+        ]
+    }
+
     /// Alpha below which a part is not drawn where it is drawn opaque elsewhere; `None` where alpha means nothing.
     /// Blended parts are cut at one half.
     pub fn cutoff(&self) -> Option<f32> {
@@ -319,6 +330,24 @@ mod tests {
         let head = head();
         head.validate().unwrap();
         assert_eq!([0, 1, 2].map(|p| head.authored_material(p)), [Some(0), None, None]);
+    }
+
+    #[test]
+    fn textures_are_the_same_to_read_and_to_change() {
+        let mut material = AuthoredMaterial::default();
+        let count = material.textures().len();
+        assert_eq!(material.textures_mut().len(), count);
+        for i in 0..count {
+            let texture = AuthoredTexture {
+                image: 0,
+                uv_set: 0,
+                transform: TextureTransform::default(),
+                wrap: [Wrap::Repeat; 2],
+            };
+            *material.textures_mut()[i] = Some(texture);
+            assert!(material.textures()[i].1.is_some());
+            *material.textures_mut()[i] = None;
+        }
     }
 
     #[test]
