@@ -214,6 +214,22 @@ impl AuthoredMaterial {
         ]
     }
 
+    /// The same as places, in the same order.
+    pub fn textures_mut(&mut self) -> [&mut Option<AuthoredTexture>; TEXTURES] {
+        [
+            &mut self.base_color_texture,
+            &mut self.metallic_roughness_texture,
+            &mut self.normal_texture,
+            &mut self.occlusion_texture,
+            &mut self.emission_texture,
+            &mut self.specular_texture,
+            &mut self.specular_color_texture,
+            &mut self.clearcoat_texture,
+            &mut self.clearcoat_roughness_texture,
+            &mut self.transmission_texture,
+        ]
+    }
+
     /// Whether what is behind it can show through: it is blended, or lets light pass.
     pub fn is_see_through(&self) -> bool {
         self.alpha == AlphaMode::Blend || self.transmission > 0.0
@@ -412,6 +428,24 @@ mod tests {
         assert!(glass.is_see_through() && !AuthoredMaterial::default().is_see_through());
         assert!((glass.dielectric_f0() - 0.04).abs() < 1e-7);
         assert_eq!(AuthoredMaterial { ior: 0.0, ..glass }.dielectric_f0(), 1.0);
+    }
+
+    #[test]
+    fn textures_are_the_same_to_read_and_to_change() {
+        let mut material = AuthoredMaterial::default();
+        let count = material.textures().len();
+        assert_eq!(material.textures_mut().len(), count);
+        for i in 0..count {
+            let texture = AuthoredTexture {
+                image: 0,
+                uv_set: 0,
+                transform: TextureTransform::default(),
+                wrap: [Wrap::Repeat; 2],
+            };
+            *material.textures_mut()[i] = Some(texture);
+            assert!(material.textures()[i].1.is_some());
+            *material.textures_mut()[i] = None;
+        }
     }
 
     #[test]

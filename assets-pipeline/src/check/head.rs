@@ -46,14 +46,14 @@ pub fn size(head: &Head) -> Option<Finding> {
         HEIGHTS_METRES.start(),
         HEIGHTS_METRES.end()
     );
-    let fix = match size::guess(head, false) {
+    let fix = match size::guess(head, &[]) {
         Some(Guess { unit: Some(unit), .. }) => {
             format!("it looks like {unit}: `rubor import` makes metres of them")
         }
         Some(guess) => {
             format!("`rubor import` makes it {:.2} m, or `--height METRES`", height * guess.factor)
         }
-        None if size::is_figure(head, false) => {
+        None if size::is_figure(head, &[]) => {
             "it looks like a whole figure: `rubor import --crop-head` keeps its head".into()
         }
         None => "`rubor import --height METRES` scales it".into(),

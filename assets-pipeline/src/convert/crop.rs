@@ -116,14 +116,7 @@ fn drop_unused(head: &mut Head) {
     let mut images = std::mem::take(&mut authored.images);
     let mut new_image = vec![None; images.len()];
     for material in &mut materials {
-        let textures = [
-            &mut material.base_color_texture,
-            &mut material.metallic_roughness_texture,
-            &mut material.normal_texture,
-            &mut material.occlusion_texture,
-            &mut material.emission_texture,
-        ];
-        for texture in textures.into_iter().flatten() {
+        for texture in material.textures_mut().into_iter().flatten() {
             let old = texture.image as usize;
             texture.image = *new_image[old].get_or_insert_with(|| {
                 authored.images.push(std::mem::take(&mut images[old]));

@@ -8,15 +8,17 @@ use crate::import::obj_set::Units;
 
 /// Heights of heads, with a throat or with shoulders, metres.
 const HEADS_METRES: std::ops::RangeInclusive<f32> = 0.1..=0.8;
-/// Heights of whole figures, from a child's on, metres.
-const FIGURES_METRES: std::ops::RangeInclusive<f32> = 0.7..=2.5;
+/// Heights of whole figures, half ones of avatars too, metres.
+const FIGURES_METRES: std::ops::RangeInclusive<f32> = 0.5..=2.5;
 /// Of a head with its throat, as scans and rigs have it.
 const USUAL_HEAD_METRES: f32 = 0.26;
 const USUAL_FIGURE_METRES: f32 = 1.7;
 /// A unit is believed where it gives a height within this factor of the usual one.
 const NEAR: f32 = 1.7;
-/// From the brows to the chin is at least this part of a head; it is a whole figure where it is less.
+/// From the brows to the chin is at least this part of a head with its shoulders; of a figure it is less.
 const LEAST_FACE: f32 = 0.2;
+/// The same of what follows the joints of head and neck, which has hair and throat.
+const LEAST_HEAD: f32 = 0.4;
 
 /// What the size of a head says.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,15 +51,23 @@ pub fn flip_v(head: &mut Head) {
     head.authored.second_uvs.iter_mut().for_each(flip);
 }
 
-/// Whether the face is so small a part that a whole figure is there. `has_body`: joints say that there is more than a head.
-pub fn is_figure(head: &Head, has_body: bool) -> bool {
-    has_body || face_box(head).is_some_and(|(low, high)| high.y - low.y < LEAST_FACE * head.height())
+/// Whether the face, or where no shape says what that is the part that follows the joints of head and neck, is so small
+/// that a whole figure is there. `head_share` as in [`super::crop::to_head`].
+pub fn is_figure(head: &Head, head_share: &[f32]) -> bool {
+    let height = head.height();
+    if let Some((low, high)) = face_box(head) {
+        return high.y - low.y < LEAST_FACE * height;
+    }
+    let of_head = head.mesh.vertices.iter().zip(head_share).filter(|(_, share)| **share >= 0.5);
+    let bounds = of_head.map(|(v, _)| head.mesh.points[v.point as usize].y);
+    let (low, high) = bounds.fold((f32::MAX, f32::MIN), |(low, high), y| (low.min(y), high.max(y)));
+    high > low && high - low < LEAST_HEAD * height
 }
 
 /// The factor that a head of an unlikely size needs; `None` where its size is likely.
-pub fn guess(head: &Head, has_body: bool) -> Option<Guess> {
+pub fn guess(head: &Head, head_share: &[f32]) -> Option<Guess> {
     let height = head.height();
-    let is_figure = is_figure(head, has_body);
+    let is_figure = is_figure(head, head_share);
     let (likely, usual) = match is_figure {
         false => (HEADS_METRES, USUAL_HEAD_METRES),
         true => (FIGURES_METRES, USUAL_FIGURE_METRES),
@@ -94,16 +104,16 @@ mod tests {
             (26.0, Some(Units::Centimetres)),
             (240.0, Some(Units::Millimetres)),
         ] {
-            let found = guess(&of_height(height), false);
+            let found = guess(&of_height(height), &[]);
             assert_eq!(found.and_then(|g| g.unit), unit, "{height}");
         }
         // No unit of length makes a head of 1 or 5000.
         for height in [1.0, 5000.0] {
-            let found = guess(&of_height(height), false).expect("an unlikely height");
+            let found = guess(&of_height(height), &[]).expect("an unlikely height");
             assert_eq!(found.unit, None, "{height}");
             assert!((found.factor * height - USUAL_HEAD_METRES).abs() < 1e-4);
         }
-        assert_eq!(guess(&of_height(0.0), false), None);
+        assert_eq!(guess(&of_height(0.0), &[]), None);
     }
 
     #[test]
@@ -116,11 +126,11 @@ mod tests {
             offsets: vec![Vec3::Z; 2],
             ..BlendShape::default()
         });
-        let found = guess(&head, false).expect("an unlikely height");
+        let found = guess(&head, &[]).expect("an unlikely height");
         assert_eq!((found.unit, found.is_figure), (Some(Units::Centimetres), true));
         scale(&mut head, found.factor);
         assert!((head.height() - 1.7).abs() < 1e-5 && (head.shapes[0].offsets[0].z - 0.01).abs() < 1e-6);
-        assert_eq!(guess(&head, false), None);
+        assert_eq!(guess(&head, &[]), None);
     }
 
     #[test]

@@ -50,11 +50,11 @@ fn claims_of_headers_are_refused_in_words() {
 
 #[test]
 fn data_that_are_cut_off_or_changed_are_errors() {
-    let mut random = SplitMix64::new(17);
+    let mut random = SplitMix64(17);
     for name in ["meshopt.glb", "pack.glb", "packz.glb", "draco.glb"] {
         let (json, bin) = chunks(&data(name));
         let mut refused = 0;
-        for turn in 0..150 {
+        for turn in 0..90 {
             let mut bin = bin.clone();
             match turn % 3 {
                 0 => {
@@ -71,21 +71,21 @@ fn data_that_are_cut_off_or_changed_are_errors() {
                 Err(_) => refused += 1,
             }
         }
-        assert!(refused > 20, "{name}: {refused} of 150");
+        assert!(refused > 12, "{name}: {refused} of 90");
     }
 }
 
 #[test]
 fn pictures_that_are_cut_off_or_changed_are_errors() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut random = SplitMix64::new(23);
+    let mut random = SplitMix64(23);
     for name in ["etc1s.ktx2", "uastc.ktx2", "uastc_stored.ktx2"] {
         let whole = data(name);
         let mut refused = 0;
-        for turn in 0..400_usize {
+        for turn in 0..200_usize {
             let mut bytes = whole.clone();
-            if turn < whole.len() {
-                bytes.truncate(turn);
+            if 3 * turn < whole.len() {
+                bytes.truncate(3 * turn);
             } else {
                 (0..=random.below(3)).for_each(|_| {
                     let at = random.below(bytes.len());
@@ -95,15 +95,14 @@ fn pictures_that_are_cut_off_or_changed_are_errors() {
             std::fs::write(folder.path().join("a.ktx2"), &bytes).expect("a file");
             refused += usize::from(Gallery::default().file(folder.path(), "a.ktx2").is_err());
         }
-        assert!(refused > 200, "{name}: {refused}");
+        assert!(refused > 100, "{name}: {refused}");
     }
     let mut gallery = Gallery::default();
     assert!(gallery.file(folder.path(), "none.png").expect_err("missing").contains("none.png"));
     // A PNG that claims 60 000 x 60 000 texels.
     let mut png = data("gradient.png");
     png[16..24].copy_from_slice(&[0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60]);
-    let crc = flate2::Crc::new();
-    let mut crc = crc;
+    let mut crc = flate2::Crc::new();
     crc.update(&png[12..29]);
     png[29..33].copy_from_slice(&crc.sum().to_be_bytes());
     std::fs::write(folder.path().join("huge.png"), &png).expect("a file");

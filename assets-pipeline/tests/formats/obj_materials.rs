@@ -60,7 +60,7 @@ fn a_library_of_materials_is_the_look_of_the_head() {
     says(&imported, "taken for white", "Paint");
     says(&imported, "illum of materials is not read", "Paint");
     says(&imported, "map_Ks of materials is not read", "Paint");
-    says(&imported, "lines of materials", "look.mtl, line 17");
+    says(&imported, "lines of materials", "look.mtl, line 18");
     says(&imported, "no shapes", "");
 }
 

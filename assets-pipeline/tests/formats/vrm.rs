@@ -118,7 +118,7 @@ fn joints_say_what_belongs_to_the_head() {
             { "name": "HatEnd" },
         ]);
         d["scenes"][0]["nodes"] = json!([0, 1]);
-        d["skins"] = json!([{ "joints": [1, 3] }]);
+        d["skins"] = json!([{ "joints": [1, 3, 2] }]);
     });
     let imported = from_bytes(document.to_string().as_bytes(), Path::new("a.gltf")).unwrap();
     let share = &imported.extent.head_share;

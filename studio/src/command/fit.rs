@@ -104,8 +104,7 @@ impl Fit {
     /// Crops, scales and turns as the user says; says what it guesses.
     pub(crate) fn apply(&self, head: &mut Head, extent: &Extent, read: Read, path: &Path) -> Outcome {
         let note = |text: String| console::notes(&[Note::new(path.display().to_string(), text)]);
-        let follows = |share: &f32| *share >= 0.5;
-        let mut has_body = extent.head_share.iter().any(follows) && !extent.head_share.iter().all(follows);
+        let mut head_share = &extent.head_share[..];
         if self.crop_head {
             let Some((by, dropped)) = crop::to_head(head, &extent.head_share) else {
                 let found = "--crop-head: found no joints named head or neck and no shapes of a face";
@@ -116,7 +115,7 @@ impl Fit {
                 HeadBy::Shapes => "no joints of a head: a box around what shapes of the face move is kept",
             };
             say_dropped(path, &format!("--crop-head: {how}"), &dropped);
-            has_body = false;
+            head_share = &[];
         }
         if let Some(height) = self.height {
             let found = head.height();
@@ -131,9 +130,9 @@ impl Fit {
         } else {
             let height = head.height() / read.metres;
             // In units of the file: the guess is of a number without a unit.
-            if size::guess(head, has_body).is_some() {
+            if size::guess(head, head_share).is_some() {
                 size::scale(head, 1.0 / read.metres);
-                let guess = size::guess(head, has_body);
+                let guess = size::guess(head, head_share);
                 let factor = guess.as_ref().map_or(1.0, |g| g.factor);
                 size::scale(head, factor);
                 let what = if guess.as_ref().is_some_and(|g| g.is_figure) { "whole figure" } else { "head" };
@@ -149,7 +148,7 @@ impl Fit {
                 ));
             }
         }
-        if size::is_figure(head, has_body) && !self.crop_head {
+        if size::is_figure(head, head_share) && !self.crop_head {
             note("this is a whole figure: maps are shared with the body (--crop-head keeps its head)".into());
         }
         if self.flip_v {

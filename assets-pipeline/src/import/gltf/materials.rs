@@ -73,14 +73,7 @@ impl<'a> Materials<'a> {
             .collect();
         let shared = first.first().copied().filter(|t| first.iter().all(|other| other == t));
         if shared.is_some() {
-            let textures = [
-                &mut material_of.base_color_texture,
-                &mut material_of.metallic_roughness_texture,
-                &mut material_of.normal_texture,
-                &mut material_of.occlusion_texture,
-                &mut material_of.emission_texture,
-            ];
-            for texture in textures.into_iter().flatten().filter(|t| t.uv_set == 0) {
+            for texture in material_of.textures_mut().into_iter().flatten().filter(|t| t.uv_set == 0) {
                 texture.transform = TextureTransform::default();
             }
         }
