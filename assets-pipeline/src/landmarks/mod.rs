@@ -105,7 +105,7 @@ pub fn find_with(head: &Head, given: &BTreeMap<String, Vec3>) -> Option<Fit> {
     };
     let cloud = Cloud::of(&surface.mapped(&pose), FINE_MM);
     let fixed: Vec<(Vec3, Vec3)> = known.iter().map(|(a, b)| (*b, pose.apply(*a))).collect();
-    let (bend, quality) = register::bend(&Target::new(&cloud), &fixed);
+    let (bend, quality) = register::bend(&Target::new(&cloud), &fixed, None);
     let fitted = Fitted { pose, bend, quality, score: 1.0, confidence: 1.0 };
     Some(finish(head, &surface, fitted, given))
 }
@@ -126,7 +126,7 @@ fn refine(surface: &Surface, candidate: Candidate) -> Fitted {
         pose = pose.then(&register::align(&Target::new(&cloud), rounds));
     }
     let cloud = Cloud::of(&surface.mapped(&pose), FINE_MM);
-    let (bend, quality) = register::bend(&Target::new(&cloud), &[]);
+    let (bend, quality) = register::bend(&Target::new(&cloud), &[], None);
     let confidence = confidence(&quality, candidate.score);
     Fitted { pose, bend, quality, score: candidate.score, confidence }
 }
@@ -152,15 +152,16 @@ fn confidence(quality: &Quality, score: f32) -> f32 {
     1.0 / (1.0 + (-sum).exp())
 }
 
-/// Canonical places of [`Feature`]s, left side: measured on the default head.
-const FEATURES: [(&str, [f32; 3]); 7] = [
-    ("eye-inner", [19.6, -4.4, 74.4]),
-    ("eye-outer", [45.2, -1.6, 68.5]),
-    ("eye-top", [32.4, 2.0, 78.4]),
-    ("eye-bottom", [32.4, -5.2, 76.5]),
-    ("mouth-corner", [22.0, -72.0, 87.1]),
-    ("mouth-middle", [0.0, -70.8, 93.3]),
-    ("nose-tip", [0.0, -32.2, 110.4]),
+/// Canonical places of [`Feature`]s, left side, measured on the default head; and how far off, mm, what is seen may be by the
+/// pixels of the picture and the shape of lids and lips. Within that the surface knows better.
+const FEATURES: [(&str, [f32; 3], f32); 7] = [
+    ("eye-inner", [19.6, -4.4, 74.4], 2.0),
+    ("eye-outer", [45.2, -1.6, 68.5], 1.5),
+    ("eye-top", [32.4, 2.0, 78.4], 1.2),
+    ("eye-bottom", [32.4, -5.2, 76.5], 1.2),
+    ("mouth-corner", [22.0, -72.0, 87.1], 3.0),
+    ("mouth-middle", [0.0, -70.8, 93.3], 1.5),
+    ("nose-tip", [0.0, -32.2, 110.4], 1.5),
 ];
 
 /// Places on the canonical face of what a head that has all landmarks, the default head, shows of its openings: name and
@@ -177,13 +178,14 @@ pub fn canonical_features(head: &Head) -> Vec<(String, Vec3)> {
             of.map(|f| if f.left { f.place } else { f.place * Vec3::new(-1.0, 1.0, 1.0) }).collect();
         places.iter().sum::<Vec3>() / places.len().max(1) as f32
     };
-    FEATURES.iter().map(|(name, _)| ((*name).to_owned(), mean(name))).collect()
+    FEATURES.iter().map(|(name, ..)| ((*name).to_owned(), mean(name))).collect()
 }
 
-fn canonical_feature(feature: &Feature) -> Option<Vec3> {
-    let (_, p) = FEATURES.iter().find(|(name, _)| *name == feature.name)?;
+/// The canonical place of a feature, and how far off what is seen may be.
+fn canonical_feature(feature: &Feature) -> Option<(Vec3, f32)> {
+    let (_, p, tolerance) = FEATURES.iter().find(|(name, ..)| *name == feature.name)?;
     let p = Vec3::from_array(*p);
-    Some(if feature.left { p } else { p * Vec3::new(-1.0, 1.0, 1.0) })
+    Some((if feature.left { p } else { p * Vec3::new(-1.0, 1.0, 1.0) }, *tolerance))
 }
 
 fn finish(head: &Head, surface: &Surface, fitted: Fitted, given: &BTreeMap<String, Vec3>) -> Fit {
@@ -193,8 +195,14 @@ fn finish(head: &Head, surface: &Surface, fitted: Fitted, given: &BTreeMap<Strin
     let target = Target::new(&cloud);
     let front = features::Front::new(head, &mapped, pose);
     let found = front.features(|p| fitted.bend.apply(p));
-    let mut fixed: Vec<(Vec3, Vec3)> =
-        found.iter().filter_map(|f| Some((canonical_feature(f)?, f.place))).collect();
+    let held = |feature: &Feature| {
+        let (canonical, tolerance) = canonical_feature(feature)?;
+        let expected = fitted.bend.apply(canonical);
+        let off = feature.place - expected;
+        let excess = (off.length() - tolerance).max(0.0);
+        Some((canonical, expected + off.normalize_or_zero() * excess))
+    };
+    let mut fixed: Vec<(Vec3, Vec3)> = found.iter().filter_map(held).collect();
     // What was given counts for more than what was seen near it.
     let canonical = &template().landmarks;
     let given_pairs: Vec<(Vec3, Vec3)> = (canonical.iter())
@@ -202,7 +210,8 @@ fn finish(head: &Head, surface: &Surface, fitted: Fitted, given: &BTreeMap<Strin
         .collect();
     fixed.retain(|(place, _)| given_pairs.iter().all(|(g, _)| g.distance(*place) > 12.0));
     fixed.extend(given_pairs);
-    let bend = if fixed.is_empty() { fitted.bend } else { register::bend(&target, &fixed).0 };
+    let bend =
+        if fixed.is_empty() { fitted.bend } else { register::bend(&target, &fixed, Some(fitted.bend)).0 };
     let head_from_canonical = pose.inverse();
     let keys: Vec<[f32; 3]> = cloud.places.iter().map(|p| p.to_array()).collect();
     let tree = tree::Tree::new(&keys);
@@ -218,6 +227,9 @@ fn finish(head: &Head, surface: &Surface, fitted: Fitted, given: &BTreeMap<Strin
             .nearest(&place.to_array(), 6.0)
             .map_or(place, |(i, _)| place + cloud.normals[i] * cloud.normals[i].dot(cloud.places[i] - place));
         landmarks.insert(name.clone(), head_from_canonical.apply(on_surface));
+    }
+    if let Some(top) = top_of(head, &mapped, bend.apply(Vec3::new(0.0, 108.0, 0.0))) {
+        landmarks.insert("vertex".into(), head_from_canonical.apply(top));
     }
     landmarks.extend(given.iter().map(|(name, place)| (name.clone(), *place)));
     let quality = fitted.quality;
@@ -237,6 +249,19 @@ fn finish(head: &Head, surface: &Surface, fitted: Fitted, given: &BTreeMap<Strin
         canonical_from_head: pose,
         measures,
     }
+}
+
+/// The highest skin about the expected top of a head, on its middle plane; `None` where it is cut off or covered.
+fn top_of(head: &Head, mapped: &Surface, expected: Vec3) -> Option<Vec3> {
+    let parts = &head.mesh.parts;
+    let skin = |t: u32| {
+        let part = parts.partition_point(|p| p.triangles.end <= t);
+        part < parts.len() && matches!(kind(head, part), rubor_rig::head::Material::Skin)
+    };
+    let near = |p: &Vec3| (p.x - expected.x).abs() < 25.0 && (p.z - expected.z).abs() < 60.0;
+    let corners = mapped.corners.iter().zip(&mapped.source).filter(|(_, t)| skin(**t)).flat_map(|(c, _)| c);
+    let top = corners.filter(|p| near(p)).max_by(|a, b| a.y.total_cmp(&b.y))?;
+    ((top.y - expected.y).abs() < 35.0).then(|| Vec3::new(expected.x, top.y, top.z))
 }
 
 impl Fit {

@@ -105,26 +105,32 @@ impl Depth {
         self.window.center(index % self.window.width, index / self.window.width).extend(self.z[index])
     }
 
+    /// What [`Depth::relief`] is computed from, for any radius.
+    pub(super) fn sums(&self) -> DepthSums {
+        let (width, height) = (self.window.width, self.window.height);
+        let sums = |value: &dyn Fn(usize) -> f64| {
+            Sums::new(width, height, |i| if self.covers(i) { value(i) } else { 0.0 })
+        };
+        DepthSums {
+            depth: sums(&|i| f64::from(self.z[i])),
+            counts: sums(&|_| 1.0),
+            along_x: sums(&|i| (i % width) as f64),
+            along_y: sums(&|i| (i / width) as f64),
+        }
+    }
+
     /// Depth over its mean in a square of `2 radius + 1` pixels: 0 on planes, positive on ridges.
-    pub(super) fn relief(&self, radius: usize) -> Vec<f32> {
+    pub(super) fn relief(&self, sums: &DepthSums, radius: usize) -> Vec<f32> {
         let (width, height) = (self.window.width, self.window.height);
         let covered: Vec<bool> = self.triangles.iter().map(|t| *t != NONE).collect();
-        let value = |i: usize| if covered[i] { f64::from(self.z[i]) } else { 0.0 };
-        let (sums, counts) = (
-            Sums::new(width, height, value),
-            Sums::new(width, height, |i| f64::from(u8::from(covered[i]))),
-        );
         // Of a plane at an angle that the square sees only in part, the mean is off: its middle goes with it.
-        let (along_x, along_y) = (
-            Sums::new(width, height, |i| if covered[i] { (i % width) as f64 } else { 0.0 }),
-            Sums::new(width, height, |i| if covered[i] { (i / width) as f64 } else { 0.0 }),
-        );
+        let DepthSums { depth: sums, counts, along_x, along_y } = sums;
         let mut relief = vec![0.0; width * height];
         for i in (0..relief.len()).filter(|i| covered[*i]) {
             let (x, y) = (i % width, i / width);
             let count = counts.around(x, y, radius).max(1.0);
             let mean = |sums: &Sums| sums.around(x, y, radius) / count;
-            let off = Vec2::new(mean(&along_x) as f32 - x as f32, mean(&along_y) as f32 - y as f32);
+            let off = Vec2::new(mean(along_x) as f32 - x as f32, mean(along_y) as f32 - y as f32);
             let slope = |step: usize, at: usize, last: usize| {
                 let (before, after) =
                     (if at > 0 { i - step } else { i }, if at < last { i + step } else { i });
@@ -139,10 +145,18 @@ impl Depth {
             } else {
                 0.0
             };
-            relief[i] = self.z[i] + tilt - mean(&sums) as f32;
+            relief[i] = self.z[i] + tilt - mean(sums) as f32;
         }
         relief
     }
+}
+
+/// Sums over rectangles of a picture of depth.
+pub(super) struct DepthSums {
+    depth: Sums,
+    counts: Sums,
+    along_x: Sums,
+    along_y: Sums,
 }
 
 /// Sums over rectangles (F. Crow 1984).
@@ -205,9 +219,9 @@ mod tests {
     #[test]
     fn relief_is_what_stands_out_of_a_slope() {
         let slope = sheet(|x, y| 0.5 * x + 0.2 * y);
-        assert!(slope.relief(6).iter().all(|r| r.abs() < 1e-3), "a tilted plane is flat up to its border");
+        assert!(slope.relief(&slope.sums(), 6).iter().all(|r| r.abs() < 1e-3), "a tilted plane is flat up to its border");
         let ridge = sheet(|x, _| 0.3 * (-x * x / 0.01).exp());
-        let relief = ridge.relief(6);
+        let relief = ridge.relief(&ridge.sums(), 6);
         let at = |x: f32| relief[ridge.window.index(Vec2::new(x, 0.0)).unwrap()];
         assert!(at(0.0) > 0.1 && at(0.25) < -0.02 && at(0.8).abs() < 1e-3);
     }

@@ -6,6 +6,7 @@
 
 use glam::{DVec3, Mat3, Vec3};
 use nalgebra::{DMatrix, Matrix3};
+use rayon::prelude::*;
 
 use super::surface::{Cloud, Similarity};
 use super::template::{Template, is_inner, template};
@@ -33,19 +34,17 @@ impl<'a> Target<'a> {
 
     /// Corresponding points of moved places; `reach` is in centimetres of the keys.
     fn matches(&self, template: &Template, moved: &[Vec3], normals: &[Vec3], reach: f32) -> Vec<Match> {
-        let mut found = Vec::with_capacity(moved.len());
-        for (i, p) in moved.iter().enumerate() {
-            let key = Cloud::key(*p, normals[i], template.cloud.bumps[i]);
-            if let Some((target, d2)) = self.tree.nearest(&key, reach) {
-                if self.cloud.normals[target].dot(normals[i]) < 0.4 {
-                    continue;
-                }
+        (0..moved.len())
+            .into_par_iter()
+            .filter_map(|i| {
+                let key = Cloud::key(moved[i], normals[i], template.cloud.bumps[i]);
+                let (target, d2) = self.tree.nearest(&key, reach)?;
                 // Biweight of J. Tukey: what is far off does not pull.
                 let t = 1.0 - d2 / (reach * reach);
-                found.push(Match { point: i, target, weight: template.weights[i] * t * t });
-            }
-        }
-        found
+                let is_facing = self.cloud.normals[target].dot(normals[i]) > 0.4;
+                is_facing.then(|| Match { point: i, target, weight: template.weights[i] * t * t })
+            })
+            .collect()
     }
 }
 
@@ -173,6 +172,21 @@ impl Bend {
         (radial + linear).as_vec3()
     }
 
+    /// Places and normals of the template, bent.
+    fn moved(&self, template: &Template) -> (Vec<Vec3>, Vec<Vec3>) {
+        let cloud = &template.cloud;
+        (0..cloud.places.len())
+            .into_par_iter()
+            .map(|i| {
+                let (p, n) = (cloud.places[i], cloud.normals[i]);
+                // Tangents move with the bend; their cross product is the normal.
+                let (a, b) = n.any_orthonormal_pair();
+                let along = |d: Vec3| self.apply(p + d * 2.0) - self.apply(p - d * 2.0);
+                (self.apply(p), along(a).cross(along(b)).normalize_or(n))
+            })
+            .unzip()
+    }
+
     /// The linear part alone.
     fn linear(&self) -> [DVec3; 3] {
         let n = self.centers.len();
@@ -239,25 +253,29 @@ pub(super) struct Quality {
 const ROUNDS: [(f64, f32); 10] = [
     (3.0, 0.5),
     (1.0, 0.5),
-    (0.4, 0.5),
-    (0.2, 0.5),
+    (0.3, 0.5),
     (0.1, 0.5),
-    (0.05, 0.45),
-    (0.03, 0.4),
-    (0.02, 0.35),
-    (0.015, 0.3),
-    (0.015, 0.3),
+    (0.05, 0.5),
+    (0.02, 0.5),
+    (0.01, 0.5),
+    (0.006, 0.45),
+    (0.004, 0.4),
+    (0.004, 0.4),
 ];
 
-/// Bends the template onto a surface in nearly canonical space. `fixed` are canonical places whose targets are known.
-pub(super) fn bend(target: &Target<'_>, fixed: &[(Vec3, Vec3)]) -> (Bend, Quality) {
+/// Rounds that are left to a bend that starts from another.
+const LAST_ROUNDS: usize = 4;
+
+/// Bends the template onto a surface in nearly canonical space. `fixed` are canonical places whose targets are known; a
+/// bend that was found without them is a start.
+pub(super) fn bend(target: &Target<'_>, fixed: &[(Vec3, Vec3)], start: Option<Bend>) -> (Bend, Quality) {
     let template = template();
-    let mut bend = Bend::identity();
-    let identity: Vec<Vec3> = template.cloud.places.clone();
-    let mut moved = identity.clone();
-    let mut normals = template.cloud.normals.clone();
+    let first = if start.is_some() { ROUNDS.len() - LAST_ROUNDS } else { 0 };
+    let mut bend = start.unwrap_or_else(Bend::identity);
+    let identity: &[Vec3] = &template.cloud.places;
+    let (mut moved, mut normals) = bend.moved(template);
     let total: f32 = template.weights.iter().sum();
-    for (round, (stiffness, slide)) in ROUNDS.into_iter().enumerate() {
+    for (round, (stiffness, slide)) in ROUNDS.into_iter().enumerate().skip(first) {
         let reach = 2.2 - 0.09 * round as f32;
         let matches = target.matches(template, &moved, &normals, reach);
         let mut pairs: Vec<(Vec3, Vec3, f32)> = (matches.iter())
@@ -276,15 +294,7 @@ pub(super) fn bend(target: &Target<'_>, fixed: &[(Vec3, Vec3)]) -> (Bend, Qualit
         if bend.fit(&pairs, stiffness * f64::from(total) * 0.01).is_none() {
             break;
         }
-        moved = identity.iter().map(|p| bend.apply(*p)).collect();
-        normals = (identity.iter().zip(&template.cloud.normals))
-            .map(|(p, n)| {
-                // Tangents move with the bend; their cross product is the normal.
-                let (a, b) = n.any_orthonormal_pair();
-                let along = |d: Vec3| bend.apply(*p + d * 2.0) - bend.apply(*p - d * 2.0);
-                along(a).cross(along(b)).normalize_or(*n)
-            })
-            .collect();
+        (moved, normals) = bend.moved(template);
     }
     let quality = quality(target, &bend, &moved, &normals);
     (bend, quality)

@@ -10,7 +10,7 @@
 use glam::{Mat3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::raster::{Depth, Window};
+use super::raster::{Depth, DepthSums, Window};
 use super::surface::{Similarity, Surface};
 use super::template::{RELIEF_HEIGHT, RELIEF_LOW_MM, RELIEF_PIXEL_MM, RELIEF_RADIUS, RELIEF_WIDTH, template};
 use super::tree::Tree;
@@ -24,12 +24,22 @@ pub(super) struct Candidate {
     pub score: f32,
 }
 
-/// Height of the window that is looked for as part of the height of everything: from a mask of a face to a whole body.
-const UPRIGHT_PARTS: (f32, f32) = (1.1, 0.06);
-/// The same for heads that may be turned.
-const TURNED_PARTS: (f32, f32) = (1.1, 0.26);
-/// From one scale to the next.
-const SCALE_STEP: f32 = 1.13;
+/// Scales that are tried.
+#[derive(Clone, Copy)]
+struct Scales {
+    /// Height of the window that is looked for as part of the height of everything.
+    largest: f32,
+    smallest: f32,
+    /// From one to the next.
+    step: f32,
+}
+
+/// From a mask of a face to a whole body.
+const UPRIGHT: Scales = Scales { largest: 1.1, smallest: 0.06, step: 1.13 };
+/// Of heads that may be turned.
+const TURNED: Scales = Scales { largest: 1.1, smallest: 0.26, step: 1.2 };
+/// Candidates under this correlation are not looked at closer, but for the best.
+const LEAST: f32 = 0.5;
 /// Correlation from which an upright face is not looked for in other directions.
 const CLEAR: f32 = 0.72;
 /// Candidates that are handed on.
@@ -38,7 +48,7 @@ const MOST: usize = 5;
 /// Poses, best first.
 pub(super) fn candidates(surface: &Surface) -> Vec<Candidate> {
     let upright = [0.0f32, -18.0, 18.0].map(|pitch| Mat3::from_rotation_x(-pitch.to_radians()));
-    let mut found = scan(surface, &upright, UPRIGHT_PARTS);
+    let mut found = scan(surface, &upright, UPRIGHT);
     if found.first().is_none_or(|c| c.score < CLEAR) {
         let mut turns = Vec::new();
         for normal in symmetry_normals(surface) {
@@ -52,15 +62,15 @@ pub(super) fn candidates(surface: &Surface) -> Vec<Candidate> {
                 }
             }
         }
-        found.extend(scan(surface, &turns, TURNED_PARTS));
+        found.extend(scan(surface, &turns, TURNED));
         found = distinct(found);
     }
     found
 }
 
 /// The best candidate of each direction and scale.
-fn scan(surface: &Surface, turns: &[Mat3], parts: (f32, f32)) -> Vec<Candidate> {
-    let found: Vec<Candidate> = turns.par_iter().flat_map_iter(|turn| scan_view(surface, turn, parts)).collect();
+fn scan(surface: &Surface, turns: &[Mat3], scales: Scales) -> Vec<Candidate> {
+    let found: Vec<Candidate> = turns.par_iter().flat_map_iter(|turn| scan_view(surface, turn, scales)).collect();
     distinct(found)
 }
 
@@ -75,7 +85,8 @@ fn distinct(mut found: Vec<Candidate>) -> Vec<Candidate> {
             let turned = (between.linear * Vec3::Z).normalize_or_zero().dot(Vec3::Z);
             between.apply(nose).distance(nose) > 25.0 || turned < 0.85
         };
-        if kept.len() < MOST && kept.iter().all(is_new) {
+        let is_good = kept.is_empty() || candidate.score > LEAST;
+        if is_good && kept.len() < MOST && kept.iter().all(is_new) {
             kept.push(candidate);
         }
     }
@@ -94,7 +105,8 @@ fn probes() -> Vec<(f32, f32, f32)> {
         .collect()
 }
 
-fn scan_view(surface: &Surface, turn: &Mat3, (largest, smallest): (f32, f32)) -> Vec<Candidate> {
+fn scan_view(surface: &Surface, turn: &Mat3, scales: Scales) -> Vec<Candidate> {
+    let Scales { largest, smallest, step } = scales;
     let triangles: Vec<[Vec3; 3]> = surface.corners.iter().map(|t| t.map(|p| *turn * p)).collect();
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for p in triangles.iter().flatten() {
@@ -112,7 +124,7 @@ fn scan_view(surface: &Surface, turn: &Mat3, (largest, smallest): (f32, f32)) ->
         let mut octave = Vec::new();
         while part > smallest && octave.first().is_none_or(|first| part > 0.5 * first) {
             octave.push(part);
-            part /= SCALE_STEP;
+            part /= step;
         }
         let window_height = RELIEF_HEIGHT as f32;
         let pixel = octave.last().map_or(1.0, |p| p * height / window_height);
@@ -128,11 +140,12 @@ fn scan_view(surface: &Surface, turn: &Mat3, (largest, smallest): (f32, f32)) ->
             pixel,
         );
         let depth = Depth::draw(window, triangles.iter().copied());
+        let sums = depth.sums();
         for part in octave {
             // Head units and picture pixels of a pixel of the template.
             let unit = part * height / window_height;
             let stride = unit / pixel;
-            if let Some(candidate) = best_place(&depth, turn, unit, stride, &probes) {
+            if let Some(candidate) = best_place((&depth, &sums), turn, unit, stride, &probes) {
                 found.push(candidate);
             }
         }
@@ -142,14 +155,14 @@ fn scan_view(surface: &Surface, turn: &Mat3, (largest, smallest): (f32, f32)) ->
 
 /// The place of the template in a picture that correlates best.
 fn best_place(
-    depth: &Depth,
+    (depth, sums): (&Depth, &DepthSums),
     turn: &Mat3,
     unit: f32,
     stride: f32,
     probes: &[(f32, f32, f32)],
 ) -> Option<Candidate> {
     let window = depth.window;
-    let relief = depth.relief((RELIEF_RADIUS as f32 * stride).round() as usize);
+    let relief = depth.relief(sums, (RELIEF_RADIUS as f32 * stride).round() as usize);
     let mm = RELIEF_PIXEL_MM / unit;
     let offsets: Vec<(isize, f32)> = (probes.iter())
         .map(|(x, y, r)| {

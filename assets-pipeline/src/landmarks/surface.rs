@@ -143,7 +143,7 @@ impl Cloud {
             let corners = surface.corners.iter().map(|t| t.map(|p| turn * p));
             let depth = Depth::draw(window, corners);
             let radius = (BUMP_RADIUS_MM / pixel_mm).round() as usize;
-            let relief = depth.relief(radius);
+            let relief = depth.relief(&depth.sums(), radius);
             for (i, relief) in relief.iter().enumerate() {
                 let Some(triangle) = depth.triangle_at(i) else { continue };
                 let place = turn.transpose() * depth.place(i);

@@ -174,7 +174,7 @@ pub fn canonical_face(head: &Head) -> Vec<u8> {
         height: RELIEF_HEIGHT + 2 * RELIEF_RADIUS,
     };
     let depth = Depth::draw(window, surface.corners.iter().copied());
-    let full = depth.relief(RELIEF_RADIUS);
+    let full = depth.relief(&depth.sums(), RELIEF_RADIUS);
     let at = |x: usize, y: usize| (y + RELIEF_RADIUS) * window.width + x + RELIEF_RADIUS;
     let relief = (0..RELIEF_WIDTH * RELIEF_HEIGHT)
         .map(|i| {

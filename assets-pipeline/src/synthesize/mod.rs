@@ -19,6 +19,7 @@ mod expressions;
 mod face_space;
 mod lines;
 mod noise;
+mod own_hair;
 mod regions;
 mod relief;
 mod specular;
@@ -405,6 +406,7 @@ pub fn synthesize_into_with(
     if head.maps.albedo.is_some() {
         return complete(head, options, step);
     }
+    let options = &own_hair::without_own(head, &FaceSpace::fit(head), options);
     head.maps = synthesize_with(head, options, step)?;
     strands::grow_brows(head, options);
     head.provenance.retain(|p| !p.of.starts_with("maps."));

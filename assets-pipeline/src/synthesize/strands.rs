@@ -24,7 +24,7 @@ use crate::parts::is_long;
 /// hairs, and these are fewer.
 const WIDTH_MM: f32 = 0.13;
 /// Name of the part that holds the brows.
-const BROWS: &str = "brows";
+pub(super) const BROWS: &str = "brows";
 /// Strands of an upper and of a lower lash card.
 const LASHES: [(&str, usize); 2] = [("upper", 92), ("lower", 44)];
 

@@ -18,7 +18,7 @@ const COLUMNS: usize = 48;
 const ROWS: usize = 48;
 
 /// Places every landmark of the canonical face on the head; on the cylinder they need not touch the skin.
-fn landmarks(head: &mut Head) {
+pub(super) fn landmarks(head: &mut Head) {
     for name in rubor_rig::landmarks::MIDDLE {
         head.landmarks.insert(name.into(), canonical(name) / MM_PER_METRE);
     }
