@@ -60,7 +60,7 @@ fn document(parts: &[(&str, Option<usize>)], materials: Value) -> Value {
         "textures": [
             {"source": 0, "sampler": 0},
             {"source": 1},
-            {"extensions": {"KHR_texture_basisu": {"source": 0}}},
+            {"extensions": {"ACME_texture_paint": {"source": 0}}},
         ],
     })
 }
@@ -185,7 +185,7 @@ fn what_cannot_be_read_is_said() {
     });
     let imported = import(&document(&[("Torus", Some(0))], json!([material])));
     says(&imported, "picture cannot be read", "material 0, base colour (image 1: ");
-    says(&imported, "KHR_texture_basisu", "material 0, metallic-roughness");
+    says(&imported, "ACME_texture_paint", "material 0, metallic-roughness");
     says(&imported, "textures that do not exist", "material 0, normal");
     says(&imported, "third set", "material 0, occlusion");
     says(&imported, "are clamped", "material 0 (7.0)");

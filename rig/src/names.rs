@@ -368,14 +368,18 @@ pub struct Target {
 pub struct Resolver {
     names: Vec<String>,
     keys: Vec<Key>,
+    /// Of each name: another spelling of its key, and not what another program calls it.
+    is_plain: Vec<bool>,
 }
 
 impl Resolver {
     /// For any list of names; targets are indices into it.
     pub fn new<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
-        let keys = names.iter().map(|n| canonical(n).map_or_else(|| Key::spoken(n), Key::new)).collect();
-        Self { names, keys }
+        let key = |n: &String| canonical(n).map_or_else(|| Key::spoken(n), Key::new);
+        let keys: Vec<Key> = names.iter().map(key).collect();
+        let is_plain = names.iter().zip(&keys).map(|(n, key)| Key::new(n) == *key).collect();
+        Self { names, keys, is_plain }
     }
 
     /// For the blend shapes of a head.
@@ -433,7 +437,12 @@ impl Resolver {
             return vec![whole(index)];
         }
         let key = canonical(written).map_or_else(|| Key::spoken(written), Key::new);
-        let find = |key: &Key| self.keys.iter().position(|k| k == key);
+        // A head may have a shape under ARKit's name and under another one.
+        let find = |key: &Key| {
+            let mut same = (0..self.keys.len()).filter(|i| self.keys[*i] == *key);
+            let first = same.next()?;
+            Some(std::iter::once(first).chain(same).find(|i| self.is_plain[*i]).unwrap_or(first))
+        };
         if let Some(index) = find(&key) {
             return vec![whole(index)];
         }
@@ -725,6 +734,8 @@ mod tests {
             let known = here.replace("_*", "").replace('*', "Left");
             assert!(is_known_shape(&known), "{here} is no name of ours");
         }
+        let both = Resolver::new(["Fcl_EYE_Close_L", "EyeBlinkLeft"]);
+        assert_eq!(resolved(&both, "eyeBlink_L"), [("EyeBlinkLeft".to_owned(), 1.0)]);
         for own in ["CTRL_expressions_earUpL", "Nose_Nostril_Dilate_L", "Fcl_HA_Hide", "viseme_sil"] {
             assert!(canonical(own).is_none() && !is_known_shape(own), "{own}");
         }

@@ -98,7 +98,7 @@ pub fn summed(findings: Vec<Finding>) -> Vec<Finding> {
 }
 
 /// Names in a message: all of a few, the first of many.
-pub(crate) fn list<S: AsRef<str>>(names: &[S]) -> String {
+pub fn list<S: AsRef<str>>(names: &[S]) -> String {
     const SHOWN: usize = 8;
     let shown = names.iter().take(SHOWN).map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
     match names.len().checked_sub(SHOWN) {

@@ -305,13 +305,16 @@ impl Reader<'_> {
         let binding = |p: &Prim| texts(p.properties.get("material:binding")).first().map(|s| (*s).to_owned());
         let is_subset = |p: &&Prim| p.kind == "GeomSubset" && p.path.starts_with(&below);
         let subsets: Vec<&Prim> = self.layer.prims.iter().filter(is_subset).collect();
+        // Materials are inherited from prims above.
+        let bound = self.ancestors(&prim.path).find_map(binding);
         for subset in subsets {
             let of_material = subset.properties.contains_key("material:binding")
                 || subset.properties.get("familyName").and_then(Value::text) == Some("materialBind");
             if !of_material {
                 continue;
             }
-            let group = self.group(prim, last_name(&subset.path), binding(subset));
+            let material = binding(subset).or_else(|| bound.clone());
+            let group = self.group(prim, last_name(&subset.path), material);
             for face in numbers(at_rest(subset, "indices")) {
                 match groups.get_mut(face as usize) {
                     Some(of_face) if face >= 0.0 => *of_face = group,
@@ -320,8 +323,6 @@ impl Reader<'_> {
             }
         }
         if groups.contains(&u32::MAX) {
-            // Materials are inherited from prims above.
-            let bound = self.ancestors(&prim.path).find_map(binding);
             let rest = self.group(prim, last_name(&prim.path), bound);
             groups.iter_mut().filter(|g| **g == u32::MAX).for_each(|g| *g = rest);
         }

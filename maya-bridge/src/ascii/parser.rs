@@ -4,11 +4,13 @@ mod deformers;
 
 use deformers::axis;
 
+use std::collections::BTreeMap;
+
 use super::code_page;
 use super::lexer::{Lexer, Token};
 use super::scene::{
-    BlendShapeData, CurveData, Data, Drawing, MeshData, Node, NodeId, Plug, PolyCube, Scene, Transform,
-    TweakData,
+    BlendShapeData, CurveData, Data, Drawing, MeshData, Node, NodeId, Plug, PolyCube, Scene, Setting,
+    Transform, TweakData,
 };
 use super::words::{fps, metres, number, short};
 use crate::error::Fault;
@@ -231,6 +233,8 @@ impl<'a> Parser<'a> {
             "animCurveTL" | "animCurveTA" | "animCurveTU" => Data::Curve(Box::<CurveData>::default()),
             "polyCube" => Data::PolyCube(PolyCube::default()),
             "script" => Data::Script(String::new()),
+            "lambert" | "phong" | "phongE" | "blinn" | "standardSurface" | "aiStandardSurface"
+            | "openPBRSurface" | "file" | "aiImage" | "place2dTexture" => Data::Shading(BTreeMap::new()),
             _ => Data::Other,
         };
         let name = name.unwrap_or_else(|| format!("{kind}{}", self.scene.nodes.len()));
@@ -522,6 +526,26 @@ impl<'a> Parser<'a> {
                     && let Some(text) = self.text()?
                 {
                     *body = text;
+                }
+                Ok(())
+            }
+            Data::Shading(settings) => {
+                // Long names stay: shaders of plugins have no short ones that are known here.
+                let (name, _) = attribute.last();
+                if name == "ftn" || name == "fileTextureName" || name == "filename" {
+                    if let Some(text) = self.text()? {
+                        settings.insert(name.to_owned(), Setting::Text(text));
+                    }
+                    return Ok(());
+                }
+                let mut numbers = Vec::new();
+                while numbers.len() < 4
+                    && let Ok(Some(number)) = self.number()
+                {
+                    numbers.push(number);
+                }
+                if !numbers.is_empty() {
+                    settings.insert(name.to_owned(), Setting::Numbers(numbers));
                 }
                 Ok(())
             }

@@ -50,6 +50,13 @@ impl Node {
     }
 }
 
+/// The value of an attribute of a shader.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Setting {
+    Numbers(Vec<f64>),
+    Text(String),
+}
+
 #[derive(Clone, Debug)]
 pub(crate) enum Data {
     Transform(Box<Transform>),
@@ -58,6 +65,8 @@ pub(crate) enum Data {
     Tweak(Box<TweakData>),
     Curve(Box<CurveData>),
     PolyCube(PolyCube),
+    /// Attributes of shaders and textures, by the name as written.
+    Shading(BTreeMap<String, Setting>),
     /// Body of a script node.
     Script(String),
     Other,

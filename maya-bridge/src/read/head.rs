@@ -11,6 +11,7 @@ use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange, Part, Vertex}
 
 use super::Options;
 use super::geometry::{Instance, Polygons, history, instances, points, polygons, world_matrix};
+use super::looks::Looks;
 use super::weight::{Effect, effect, tell};
 use crate::appearance::Appearance;
 use crate::ascii::scene::{BlendShapeData, Data, Item, NodeId, Scene};
@@ -44,7 +45,7 @@ pub(super) fn build<'s>(
     scene: &'s Scene,
     options: &Options,
     name: &str,
-    folder: &Path,
+    folder: &'s Path,
     notes: &mut Notes,
 ) -> Result<Built<'s>, Fault> {
     let chosen = chosen(scene, options)?;
@@ -72,6 +73,7 @@ pub(super) fn build<'s>(
         driven: HashMap::new(),
         between: HashMap::new(),
         told: HashSet::new(),
+        looks: Looks::new(scene, folder),
     };
     assembly.head.name = name.to_owned();
     let mut first_fault = None;
@@ -138,6 +140,15 @@ fn is_visible(scene: &Scene, instance: &Instance) -> bool {
             .all(|id| scene.is_drawn(*id) && scene.transform(*id).is_none_or(|t| t.visible))
 }
 
+/// Faces of one shading group.
+struct Group {
+    name: String,
+    material: Material,
+    faces: Vec<u32>,
+    /// The shading group.
+    set: Option<NodeId>,
+}
+
 struct Assembly<'s> {
     scene: &'s Scene,
     appearance: Option<Appearance>,
@@ -155,6 +166,7 @@ struct Assembly<'s> {
     between: HashMap<String, String>,
     /// Blend shapes whose peculiarities are in the notes.
     told: HashSet<NodeId>,
+    looks: Looks<'s>,
 }
 
 impl<'s> Assembly<'s> {
@@ -194,7 +206,7 @@ impl<'s> Assembly<'s> {
         // A mirror turns triangles inside out.
         let mirrored = place.matrix3.determinant() < 0.0;
         let turned = mirrored != scene.mesh(mesh).is_some_and(|m| m.opposite);
-        self.faces(instance, &polygons, first_point, turned);
+        self.faces(instance, &polygons, first_point, turned, notes);
         for (node, geometry) in history.blend_shapes.iter().rev() {
             if let Data::BlendShape(data) = &scene.nodes[*node].data {
                 self.targets(*node, data, *geometry, &polygons, &place, first_point, notes)?;
@@ -204,7 +216,14 @@ impl<'s> Assembly<'s> {
     }
 
     /// Triangles by object group; vertices in the order of their texture coordinates.
-    fn faces(&mut self, instance: &Instance, polygons: &Polygons, first_point: u32, turned: bool) {
+    fn faces(
+        &mut self,
+        instance: &Instance,
+        polygons: &Polygons,
+        first_point: u32,
+        turned: bool,
+        notes: &mut Notes,
+    ) {
         let groups = self.groups(instance, polygons.faces.len());
         let mut pairs: Vec<(u32, u32)> = polygons.faces.iter().flatten().map(|[p, uv]| (*uv, *p)).collect();
         pairs.sort_unstable();
@@ -219,7 +238,7 @@ impl<'s> Assembly<'s> {
             // Every pair was put in above.
             first_vertex + pairs.binary_search(&(uv, point)).unwrap_or_default() as u32
         };
-        for (name, material, faces) in groups {
+        for Group { name, material: mut kind, faces, set } in groups {
             let start = self.head.mesh.triangles.len() as u32;
             for face in faces.into_iter().map(|f| &polygons.faces[f as usize]) {
                 let border: Vec<Vec3> =
@@ -230,12 +249,24 @@ impl<'s> Assembly<'s> {
                 }
             }
             let end = self.head.mesh.triangles.len() as u32;
-            self.head.mesh.parts.push(Part { name, material, triangles: start..end });
+            // Scenes of this crate have maps for what their shaders show.
+            let authored = set.filter(|_| self.appearance.is_none());
+            let authored = authored.and_then(|set| self.looks.material(set, notes));
+            let is_textured = authored.is_some_and(|a| self.looks.is_textured(a));
+            if is_textured && !matches!(kind, Material::Hidden | Material::Other) {
+                notes.about(
+                    "textured skin, eyes, teeth, hair and lashes keep the look of their author (`--parts NAME=skin` makes one skin)",
+                    name.as_str(),
+                );
+                kind = Material::Other;
+            }
+            self.head.authored.of_parts.push(authored);
+            self.head.mesh.parts.push(Part { name, material: kind, triangles: start..end });
         }
     }
 
     /// Name, material and faces of each object group; faces in no group are a part of their own.
-    fn groups(&self, instance: &Instance, face_count: usize) -> Vec<(String, Material, Vec<u32>)> {
+    fn groups(&self, instance: &Instance, face_count: usize) -> Vec<Group> {
         let scene = self.scene;
         let mesh = instance.mesh;
         let own = instance.name(scene);
@@ -252,8 +283,8 @@ impl<'s> Assembly<'s> {
         let groups_of_this = all.filter(|((n, _), _)| *n == number);
         for (index, ((_, group), ranges)) in groups_of_this.enumerate() {
             let attribute = format!("iog[{number}].og[{group}]");
-            let set = sets.get(attribute.as_str()).map(|set| scene.nodes[*set].name.clone());
-            let Some(set) = set else { continue };
+            let Some(node) = sets.get(attribute.as_str()).copied() else { continue };
+            let set = scene.nodes[node].name.clone();
             let mut faces = Vec::new();
             for [from, to] in ranges {
                 for face in *from..=(*to).min((face_count as u32).saturating_sub(1)) {
@@ -267,11 +298,13 @@ impl<'s> Assembly<'s> {
                 Some(e) if set == shading_group(index, &e.name) => (e.name.clone(), e.material),
                 _ => (set.clone(), guess_material(&format!("{set} {own}"))),
             };
-            groups.push((part.0, part.1, faces));
+            groups.push(Group { name: part.0, material: part.1, faces, set: Some(node) });
         }
         let rest: Vec<u32> = (0..face_count as u32).filter(|f| !taken[*f as usize]).collect();
         if !rest.is_empty() {
-            groups.push((own.to_owned(), guess_material(own), rest));
+            // A set of the whole instance has no group.
+            let set = sets.get(format!("iog[{number}]").as_str()).or_else(|| sets.get("iog")).copied();
+            groups.push(Group { name: own.to_owned(), material: guess_material(own), faces: rest, set });
         }
         groups
     }
@@ -471,6 +504,10 @@ impl<'s> Assembly<'s> {
         notes: &mut Notes,
     ) -> Built<'s> {
         let mut head = self.head;
+        (head.authored.materials, head.authored.images) = self.looks.finish();
+        if head.authored.materials.is_empty() {
+            head.authored = Default::default();
+        }
         let shape = |(name, offsets): (String, BTreeMap<u32, Vec3>)| {
             let (points, offsets) = offsets.into_iter().unzip();
             BlendShape { name, points, offsets, ..BlendShape::default() }

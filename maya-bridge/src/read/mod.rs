@@ -3,6 +3,7 @@
 mod curve;
 mod geometry;
 pub(crate) mod head;
+mod looks;
 mod motion;
 mod weight;
 

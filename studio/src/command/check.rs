@@ -18,7 +18,7 @@ use rubor::{Failure, Outcome};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Heads (.glb, .gltf, .vrm, .ma, .usda), rigs, sequences, retarget files (.json), recordings (.csv, .json); files that
+    /// Heads (.glb, .gltf, .vrm, .obj, .ma, .usda, .usdz), rigs, sequences, retarget files (.json), recordings (.csv, .json); files that
     /// are given together is checked together
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
@@ -37,6 +37,8 @@ enum Kind {
     Gltf,
     Maya,
     Usd,
+    /// Read as a head; nothing is known of it that import does not say.
+    Head,
     Rig,
     Sequence,
     Retarget,
@@ -49,6 +51,7 @@ impl Kind {
             Self::Gltf => "glTF",
             Self::Maya => "Maya ASCII",
             Self::Usd => "USD",
+            Self::Head => "head",
             Self::Rig => "rig",
             Self::Sequence => "sequence",
             Self::Retarget => "retarget file",
@@ -83,6 +86,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         let subject = match report.kind {
             Kind::Gltf => gltf(&report.file, &mut report.findings),
             Kind::Maya => maya(&report.file, &mut report.findings),
+            Kind::Head => head(&report.file, &mut report.findings),
             Kind::Usd => {
                 usd(&report.file, &mut report.findings);
                 None
@@ -109,8 +113,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             loaded.map_err(|e| reports[i].findings.push(Finding::error("", e.to_string()))).ok()
         })
         .collect();
-    let needs_head = |r: &Report| !matches!(r.kind, Kind::Gltf | Kind::Maya | Kind::Usd);
-    let given = reports.iter().any(|r| matches!(r.kind, Kind::Gltf | Kind::Maya));
+    let needs_head = |r: &Report| !matches!(r.kind, Kind::Gltf | Kind::Maya | Kind::Usd | Kind::Head);
+    let given = reports.iter().any(|r| matches!(r.kind, Kind::Gltf | Kind::Maya | Kind::Head));
     if !given && reports.iter().any(needs_head) {
         let built_in = inputs::head(None)?;
         heads.push(Subject { report: None, head: built_in.head, rig: built_in.rig, sequence: None });
@@ -190,11 +194,12 @@ fn kind(file: &Path) -> Outcome<Kind> {
     match extension.as_str() {
         "glb" | "gltf" | "vrm" => Ok(Kind::Gltf),
         "ma" => Ok(Kind::Maya),
-        "usda" | "usd" | "usdc" | "usdz" => Ok(Kind::Usd),
+        "usda" | "usd" | "usdc" => Ok(Kind::Usd),
+        "obj" | "usdz" => Ok(Kind::Head),
         "csv" => Ok(Kind::Capture),
         "json" => json_kind(file),
         _ => Err(Failure::input(format!(
-            "{}: found a name that ends in .{extension}, expected .glb, .gltf, .vrm, .ma, .usda, .csv or .json",
+            "{}: found a name that ends in .{extension}, expected .glb, .gltf, .vrm, .obj, .ma, .usda, .usdz, .csv or .json",
             file.display()
         ))),
     }
@@ -228,6 +233,20 @@ fn gltf(file: &Path, findings: &mut Vec<Finding>) -> Option<Subject> {
     }
     match inputs::head(Some(file)) {
         Ok(loaded) => {
+            findings.extend(check::head::check(&loaded.head));
+            Some(Subject { report: None, head: loaded.head, rig: loaded.rig, sequence: loaded.sequence })
+        }
+        Err(e) => {
+            findings.push(Finding::error("", e.to_string()));
+            None
+        }
+    }
+}
+
+fn head(file: &Path, findings: &mut Vec<Finding>) -> Option<Subject> {
+    match inputs::head_of_any_size(Some(file)) {
+        Ok(loaded) => {
+            findings.extend(loaded.notes.iter().map(|n| Finding::warning("", n.message.clone())));
             findings.extend(check::head::check(&loaded.head));
             Some(Subject { report: None, head: loaded.head, rig: loaded.rig, sequence: loaded.sequence })
         }

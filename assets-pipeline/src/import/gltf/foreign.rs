@@ -189,8 +189,10 @@ impl Builder<'_> {
                 None => vec![[0.0; 2]; count],
             };
             check("TEXCOORD_1", second_uvs.len())?;
-            if let Some(a) = primitive.get(&Semantic::TexCoords(0)).filter(|a| !is_plain(a)) {
-                self.spread(&primitive, &mut uvs, &at(&format!("TEXCOORD_0, {:?}", a.data_type())));
+            if let Some(a) = primitive.get(&Semantic::TexCoords(0))
+                && a.data_type() != gltf::accessor::DataType::F32
+            {
+                self.spread(&primitive, &mut uvs, a.normalized(), &at("TEXCOORD_0"));
             }
             let colors = colors(document, &at("COLOR_0"), &primitive, count)?;
             check("COLOR_0", colors.len())?;
@@ -264,9 +266,9 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Whole numbers as texture coordinates need a transform to be 0 to 1. Where all textures of the material have the
-    /// same one it moves from the textures to the vertices, so that every map of the part has the same coordinates.
-    fn spread(&mut self, primitive: &Primitive<'_>, uvs: &mut [[f32; 2]], at: &str) {
+    /// Texture coordinates of whole numbers may need a transform to be 0 to 1. Where all textures of the material have
+    /// the same one it moves from the textures to the vertices, so that every map of the part has the same coordinates.
+    fn spread(&mut self, primitive: &Primitive<'_>, uvs: &mut [[f32; 2]], is_normalized: bool, at: &str) {
         let material = self.materials.read(primitive.material().index(), self.notes);
         match self.materials.take_transform(material) {
             Some(transform) => {
@@ -275,6 +277,7 @@ impl Builder<'_> {
                     *uv = matrix.transform_point2(Vec2::from_array(*uv)).to_array();
                 }
             }
+            None if is_normalized => {}
             None => {
                 let message = "texture coordinates are whole numbers and the textures do not say one scale for them: maps of rubor's own repeat there";
                 self.notes.add(message, at);
@@ -364,11 +367,6 @@ impl Builder<'_> {
         }
         Foreign { head, shapes, instances: self.instances, extent: self.extent }
     }
-}
-
-/// Whether texture coordinates are floats or normalized.
-fn is_plain(accessor: &gltf::Accessor<'_>) -> bool {
-    accessor.normalized() || accessor.data_type() == gltf::accessor::DataType::F32
 }
 
 /// Names of node and mesh, to choose parts by.
