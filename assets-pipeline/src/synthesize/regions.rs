@@ -210,7 +210,6 @@ impl Regions {
     }
 
     /// Weights at a canonical position.
-    #[cfg(test)]
     pub(crate) fn at(place: Vec3) -> Self {
         Self::with(place, 1.0)
     }

@@ -271,15 +271,21 @@ fn place_face(head: &mut Head, common: &Common, about: &str) -> Outcome {
     let percent = (100.0 * fit.confidence).floor();
     if fit.confidence >= landmarks::TRUSTED {
         if !is_known {
-            note(format!("a face was found on the surface (confidence {percent} %), landmarks are placed by it"));
+            note(format!(
+                "a face was found on the surface (confidence {percent} %), landmarks are placed by it"
+            ));
         }
         if fit.turned_degrees > MOST_TURNED_DEGREES {
             let angle = fit.turned_degrees.round();
-            note(format!("the face is turned by {angle} degrees from upright and looking along +Z: pictures show it so"));
+            note(format!(
+                "the face is turned by {angle} degrees from upright and looking along +Z: pictures show it so"
+            ));
         }
         let size = fit.size();
         if !(LIKELY_SIZES.0..LIKELY_SIZES.1).contains(&size) {
-            note(format!("the face is {size:.2} times as large as an adult's: scattering and relief are in millimetres"));
+            note(format!(
+                "the face is {size:.2} times as large as an adult's: scattering and relief are in millimetres"
+            ));
         }
         fit.complete(head);
         let is_given = |name: &str| common.parts.iter().any(|(given, _)| given == name);
@@ -287,7 +293,10 @@ fn place_face(head: &mut Head, common: &Common, about: &str) -> Outcome {
             parts::recognise(head, &fit, is_given).iter().map(|n| Note::new(about, n.to_string())).collect();
         console::notes(&said);
         console::notes(
-            &parts::fit_coordinates(head, true).iter().map(|n| Note::new(about, n.to_string())).collect::<Vec<_>>(),
+            &parts::fit_coordinates(head, true)
+                .iter()
+                .map(|n| Note::new(about, n.to_string()))
+                .collect::<Vec<_>>(),
         );
     } else if !is_known {
         note(format!(
@@ -360,7 +369,9 @@ pub(crate) fn finish_with(
     } else if lacks_maps(&head) && common.maps > 0 {
         if !synthesize::finds_face(&head) {
             let message = match head.maps.albedo {
-                Some(_) => "no landmarks say where the face is: skin gets no wrinkles, and its blood changes alike everywhere",
+                Some(_) => {
+                    "no landmarks say where the face is: skin gets no wrinkles, and its blood changes alike everywhere"
+                }
                 None => "no landmarks say where the face is: skin gets no hair, brows and wrinkles",
             };
             console::notes(&[Note::new(path.display().to_string(), message)]);

@@ -450,10 +450,12 @@ impl Shade {
     }
 
     /// Makes the resources of [`Shade::record_samples`].
-    pub(crate) fn prepare_samples(&mut self, gpu: &Gpu) {
-        let program = samples_program().flag("stored_shadows", self.stored_shadows);
-        self.samples_kernel
-            .get_or_insert_with(|| Kernel::new(gpu, "light samples", &program, "light_samples"));
+    pub(crate) fn prepare_samples(&mut self, gpu: &Gpu, with_normals: bool) {
+        if self.samples_kernel.as_ref().is_none_or(|(normals, _)| *normals != with_normals) {
+            let program = samples_program(with_normals).flag("stored_shadows", self.stored_shadows);
+            let kernel = Kernel::new(gpu, "light samples", &program, "light_samples");
+            self.samples_kernel = Some((with_normals, kernel));
+        }
     }
 
     /// Diffuse light at `count` points of a head's surface.

@@ -511,6 +511,7 @@ impl DipoleCubemap {
             first: None,
             transmittance: None,
             quality: frame.quality,
+            skin_light: None,
         };
         let params = r.uniform("shade layers", &shade::params(&lighting, head));
         let mut resources = frame.shade.resources(&lighting, head, &params);

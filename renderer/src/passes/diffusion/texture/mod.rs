@@ -254,6 +254,7 @@ impl TextureSpace {
             first: None,
             transmittance: frame.transmittance,
             quality: frame.quality,
+            skin_light: None,
         };
         let mut maps = Vec::new();
         let mut numbers = Vec::new();

@@ -120,6 +120,7 @@ impl TextureSpace {
             first: None,
             transmittance: None,
             quality: frame.quality,
+            skin_light: None,
         };
         let lamps = frame
             .light
