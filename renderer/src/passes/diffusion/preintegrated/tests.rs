@@ -395,18 +395,18 @@ fn waves(wavelength_mm: f32, in_wrinkles: bool) -> Head {
 fn relief_and_wrinkles_are_blurred_by_the_profile() {
     let Some(mut renderer) = renderer() else { return };
     let profile = Profile::deon_six();
-    for (wavelength, in_wrinkles) in [(3.0, false), (10.0, false), (3.0, true)] {
+    for (wavelength, in_wrinkles) in [(3.0, false), (7.5, false), (3.0, true)] {
         let head = waves(wavelength, in_wrinkles);
         let mut state = FaceState::neutral(&head);
         state.zones = vec![1.0];
         let lights = [lamp(Vec3::new(-0.6, 0.0, -0.8), false)];
         let mut amplitude = |scatter| {
-            let drawn = draw(&mut renderer, &head, &state, &lights, &Wanted::of(scatter, 60, 30.0));
-            // The wave along rows, by its Fourier sum; 30 mm hold whole waves.
+            let drawn = draw(&mut renderer, &head, &state, &lights, &Wanted::of(scatter, 120, 15.0));
+            // The wave along rows, by its Fourier sum; 15 mm hold whole waves, and pixels are finer than texels.
             [0, 1, 2].map(|c| {
                 let (mut sine, mut cosine) = (0.0, 0.0);
                 for (i, t) in drawn.diffuse.iter().enumerate() {
-                    let x = (i % 60) as f32 * 0.5 + 0.25;
+                    let x = (i % 120) as f32 * 0.125 + 0.0625;
                     let phase = std::f32::consts::TAU * x / wavelength;
                     sine += t[c] * phase.sin();
                     cosine += t[c] * phase.cos();
