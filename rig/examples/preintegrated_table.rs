@@ -33,7 +33,9 @@ fn main() -> Result<(), SkinError> {
         move |c: usize, cosine: f64| scattered_cosine(&profile.channels[c], shape, cosine, radius)
     };
     println!("Largest difference from a sphere over all cosines, percent of full light, R / G / B\n");
-    println!("| radius, mm | table of 129 x 64 | cylinder | ring | no scattering |\n| --- | --- | --- | --- | --- |");
+    println!(
+        "| radius, mm | table of 129 x 64 | cylinder | ring | no scattering |\n| --- | --- | --- | --- | --- |"
+    );
     for radius in RADII_MM {
         let sphere = light(Shape::Sphere, radius);
         println!(
@@ -49,7 +51,8 @@ fn main() -> Result<(), SkinError> {
     for radius in RADII_MM {
         let k = [1.0 / radius, 0.0];
         let exact = light(Shape::Cylinder, radius);
-        let by = |curvature: &dyn Fn(f64) -> f64| largest(|c, x| Ok(table.sample(x, curvature(x))[c]), &exact);
+        let by =
+            |curvature: &dyn Fn(f64) -> f64| largest(|c, x| Ok(table.sample(x, curvature(x))[c]), &exact);
         println!(
             "| {radius} | {} | {} | {} |",
             by(&|_| 0.5 / radius)?,

@@ -95,7 +95,8 @@ impl<'a> Frame<'a> {
     ) -> Lit {
         let transmittance = self.passes.transmittance.as_ref().map(|(_, t)| t);
         let first = samples.seen.first();
-        let lighting = Lighting { light, seen, first, transmittance, quality: &self.settings.quality, skin_light };
+        let lighting =
+            Lighting { light, seen, first, transmittance, quality: &self.settings.quality, skin_light };
         self.passes.shade.record(r, &lighting, &self.heads, samples.lit.as_ref())
     }
 

@@ -30,8 +30,8 @@ use crate::channels::Channel;
 pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
-    AntialiasMethod, ColorMethod, CurvatureMethod, GROUPS, Group, Method, ScatterMethod, SpecularMethod, Stage, ToneMap,
-    TransmitMethod, UnknownMethod, WrinkleMethod,
+    AntialiasMethod, ColorMethod, CurvatureMethod, GROUPS, Group, Method, ScatterMethod, SpecularMethod,
+    Stage, ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
 

@@ -437,7 +437,9 @@ impl ShadowTable {
             for (part, values) in values.iter_mut().enumerate() {
                 let filter = penumbra + reach[part];
                 let light = |x: f64| -> [f64; 3] {
-                    spreads.each_ref().map(|s| s[part].iter().map(|(y, w)| w * disk_edge((x - y) / sharp)).sum())
+                    spreads
+                        .each_ref()
+                        .map(|s| s[part].iter().map(|(y, w)| w * disk_edge((x - y) / sharp)).sum())
                 };
                 // The ends of the filter see no edge: nothing and everything, whatever the sum leaves there.
                 let (dark, lit) = (light(-filter), light(filter));

@@ -53,7 +53,10 @@ fn spheres_and_cylinders_agree_with_sums_over_their_surface() {
             for cosine in [-0.7, -0.2, 0.0, 0.15, 0.6, 1.0] {
                 let found = scattered_cosine(&profile, shape, cosine, radius).unwrap();
                 let expected = brute(&profile, shape == Shape::Sphere, cosine, radius);
-                assert!((found - expected).abs() < 1.5e-3, "{shape:?} {radius} mm, {cosine}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() < 1.5e-3,
+                    "{shape:?} {radius} mm, {cosine}: {found} {expected}"
+                );
             }
         }
     }
@@ -67,8 +70,9 @@ fn the_table_is_within_two_percent_of_a_walk_on_a_sphere() {
     // Photons that leave here entered at a distance of the profile, in any direction.
     let n = 6000;
     let walk = profile.channels.each_ref().map(|channel| {
-        let mut photon =
-            |i: usize| (channel.sample_radius((i as f64 + random.uniform()) / n as f64), 2.0 * PI * random.uniform());
+        let mut photon = |i: usize| {
+            (channel.sample_radius((i as f64 + random.uniform()) / n as f64), 2.0 * PI * random.uniform())
+        };
         (0..n).map(&mut photon).collect::<Vec<_>>()
     });
     for radius in [5.0, 9.0, 30.0, 100.0] {
@@ -233,7 +237,8 @@ fn waves_are_weakened_by_their_length() {
         let q = 2.0 * PI / wavelength;
         for (c, channel) in profile.channels.iter().enumerate() {
             let RadialProfile::Gaussians(sum) = channel else { panic!("a sum of Gaussians") };
-            let exact: f64 = sum.terms().iter().map(|t| t.weight * (-0.5 * q * q * t.variance_mm2).exp()).sum();
+            let exact: f64 =
+                sum.terms().iter().map(|t| t.weight * (-0.5 * q * q * t.variance_mm2).exp()).sum();
             assert!((found[c] - exact / sum.total()).abs() < 1e-4, "{wavelength}: {} {exact}", found[c]);
         }
     }
@@ -246,7 +251,9 @@ fn hostile_input_is_refused_or_finite() {
     let table = DiffuseTable::new(&profile, 33, 16).unwrap();
     assert!(table.values.iter().flatten().all(|v| v.is_finite() && (0.0..=1.0).contains(v)));
     let shadow = ShadowTable::new(&profile, [17, 8], 12.0, 10.0).unwrap();
-    assert!(shadow.values.iter().flatten().flatten().all(|v| v.is_finite() && (-1e-9..=1.0 + 1e-9).contains(v)));
+    assert!(
+        shadow.values.iter().flatten().flatten().all(|v| v.is_finite() && (-1e-9..=1.0 + 1e-9).contains(v))
+    );
     let bands = HarmonicTable::new(&profile, 16).unwrap();
     assert!(bands.bands.iter().flatten().flatten().all(|v| v.is_finite() && v.abs() <= 1.0));
     assert!(DiffuseTable::new(&profile, 32, 16).unwrap_err().to_string().contains("odd"));

@@ -184,7 +184,8 @@ impl Relief {
             *to = [from[0] as f32, from[1] as f32, from[2] as f32, 0.0];
         }
         let level = |source: usize| (sizes[source][0] as f32 / size[0] as f32).max(1.0).log2();
-        let [first, second] = ["blurred across", "blurred across, blue"].map(|l| r.image(l, ImageSpec::light(size)));
+        let [first, second] =
+            ["blurred across", "blurred across, blue"].map(|l| r.image(l, ImageSpec::light(size)));
         let groups = pixel_groups(size);
         // Layer of a source, and where its result goes.
         let wrinkles = (0..maps.wrinkle_maps).map(|i| (1, i, first_blurred + per_map * i));

@@ -306,7 +306,8 @@ fn a_sphere_is_lit_as_the_integral_says() {
         let cosine = f64::from(normal.dot(-direction.normalize()));
         for (c, channel) in profile.channels.iter().enumerate() {
             let light = scattered_cosine(channel, Shape::Sphere, cosine, f64::from(radius)).unwrap();
-            let green = scattered_cosine(&profile.channels[1], Shape::Sphere, cosine, f64::from(radius)).unwrap();
+            let green =
+                scattered_cosine(&profile.channels[1], Shape::Sphere, cosine, f64::from(radius)).unwrap();
             // Skin without maps has a gloss of 0.6 and a roughness of 0.32.
             let expected = 3.0 / std::f64::consts::PI * light * entering(0.6, 0.32, green as f32);
             // A fiftieth of the light, and of full light where there is little: facets, and steps of the tables.
@@ -326,9 +327,8 @@ fn error_to_the_reference_on_spheres_has_a_bound() {
         let head = bare(sphere(radius, 80));
         let state = FaceState::neutral(&head);
         let lights = [lamp(Vec3::new(-1.0, -0.1, -0.4), true)];
-        let mut of = |scatter| {
-            draw(&mut renderer, &head, &state, &lights, &Wanted::of(scatter, 24, 1.7 * radius))
-        };
+        let mut of =
+            |scatter| draw(&mut renderer, &head, &state, &lights, &Wanted::of(scatter, 24, 1.7 * radius));
         let reference = of(ScatterMethod::ReferenceSurface(6));
         let [found, none] = [THREE, ScatterMethod::None].map(|m| relative_error(&of(m), &reference));
         let limits = found < bound && found < factor * none;
@@ -420,7 +420,11 @@ fn relief_and_wrinkles_are_blurred_by_the_profile() {
         let one = amplitude(ScatterMethod::PreIntegrated(1));
         for c in 0..3 {
             let share = three[c] / none[c];
-            assert!((share - expected[c]).abs() < 0.04, "{wavelength} mm, channel {c}: {share} {}", expected[c]);
+            assert!(
+                (share - expected[c]).abs() < 0.04,
+                "{wavelength} mm, channel {c}: {share} {}",
+                expected[c]
+            );
         }
         // One map is right in red and orders the channels.
         assert!((one[0] / none[0] - expected[0]).abs() < 0.04, "{one:?} {none:?}");
