@@ -7,6 +7,7 @@
 //! measured sums of Gaussians ---------------------------------------------------+         +--> sum of Gaussians
 //!                                                                                          +--> separable kernel
 //!                                                                                          +--> T(s) look-up
+//!                                                                                          +--> light on round skin, shadows
 //! ```
 //!
 //! The colour of skin as a whole (melanin, hemoglobin --> linear Rec. 709) is in `chromophores`.

@@ -11,7 +11,7 @@ use rubor_assets::compare::{flip, mean_and_percentile, relative_rmse};
 use rubor_assets::image_io::SampleKind;
 use rubor_renderer::BARE_SKIN;
 use rubor_renderer::channels::Channel;
-use rubor_renderer::settings::{ScatterMethod, Settings, TransmitMethod};
+use rubor_renderer::settings::{ScatterMethod, Settings, Stage, TransmitMethod};
 use rubor_rig::evaluate::Shot;
 use rubor_rig::map::Map;
 
@@ -162,17 +162,38 @@ fn draw(studio: &mut Studio, shots: &[Shot], settings: &Settings) -> Outcome<(Fr
     Ok((frame, diffuse))
 }
 
-/// Median GPU time of scattering; none without timestamps.
+/// Median GPU time of scattering; none without timestamps. A method that works while surfaces are lit has the time by which
+/// that takes longer than without scattering.
 fn scatter_ms(studio: &mut Studio, shot: &Shot, settings: &Settings, frames: u32) -> Outcome<Option<f64>> {
     if frames == 0 || matches!(settings.quality.scatter, ScatterMethod::ReferenceSurface(_)) {
         return Ok(None);
     }
-    let of_scatter = |(name, _): &&(&'static str, f64)| name.starts_with("scatter");
+    let is_in_shade = settings.quality.scatter.method().stage == Stage::Shading;
+    let scatter = passes_ms(studio, shot, settings, frames, &|name| {
+        name.starts_with("scatter") || (is_in_shade && name == "shade")
+    })?;
+    if !is_in_shade {
+        return Ok(scatter);
+    }
+    let mut plain = settings.clone();
+    plain.quality.scatter = ScatterMethod::None;
+    let plain = passes_ms(studio, shot, &plain, frames, &|name| name == "shade")?;
+    Ok(scatter.zip(plain).map(|(with, without)| with - without))
+}
+
+/// Median of the sum of some passes of a frame.
+fn passes_ms(
+    studio: &mut Studio,
+    shot: &Shot,
+    settings: &Settings,
+    frames: u32,
+    counts: &dyn Fn(&str) -> bool,
+) -> Outcome<Option<f64>> {
     // As many warm-up frames, which raise the clock of the device.
     let times = studio.measure(shot, settings, frames, frames)?;
     let mut ms: Vec<f64> = times
         .iter()
-        .map(|t| t.passes_ms.iter().filter(of_scatter).fold(0.0, |sum, (_, ms)| sum + ms))
+        .map(|t| t.passes_ms.iter().filter(|(name, _)| counts(name)).fold(0.0, |sum, (_, ms)| sum + ms))
         .collect();
     Ok(median(&mut ms))
 }

@@ -49,6 +49,7 @@ pub(crate) enum Channel {
 pub(crate) struct Methods {
     pub(crate) scatter: &'static str,
     pub(crate) transmit: &'static str,
+    pub(crate) curvature: &'static str,
     pub(crate) color: &'static str,
     pub(crate) wrinkles: &'static str,
     pub(crate) specular: &'static str,
@@ -78,6 +79,7 @@ pub(crate) struct Case {
 const USUAL: Methods = Methods {
     scatter: "separable:17",
     transmit: "shadow-depth",
+    curvature: "mesh",
     color: "hemoglobin",
     wrinkles: "partial-derivative",
     specular: "one-lobe",
@@ -104,6 +106,7 @@ impl Methods {
         Some(match group {
             "scatter" => self.scatter,
             "transmit" => self.transmit,
+            "curvature" => self.curvature,
             "color" => self.color,
             "wrinkles" => self.wrinkles,
             "specular" => self.specular,
@@ -123,6 +126,8 @@ fn scatter() -> Vec<Case> {
     let methods = [
         "none",
         "texture-space:512",
+        "pre-integrated:1",
+        "pre-integrated:3",
         "separable:5",
         "separable:17",
         "separable:65",
@@ -139,7 +144,16 @@ fn scatter() -> Vec<Case> {
         let name = format!("scatter-{}", scatter.replace(':', "-"));
         case(&name, "nose", Methods { scatter, transmit: "none", ..USUAL })
     };
-    methods.into_iter().map(picture).collect()
+    let pre_integrated = |name: &str, scene, curvature| {
+        case(name, scene, Methods { scatter: "pre-integrated:3", curvature, ..USUAL })
+    };
+    let more = [
+        pre_integrated("scatter-pre-integrated-front", "portrait", "mesh"),
+        pre_integrated("scatter-pre-integrated-side", "ear", "mesh"),
+        pre_integrated("scatter-pre-integrated-frown", "frown", "mesh"),
+        pre_integrated("scatter-pre-integrated-screen", "nose", "screen"),
+    ];
+    methods.into_iter().map(picture).chain(more).collect()
 }
 
 fn transmit() -> Vec<Case> {

@@ -231,6 +231,7 @@ impl Stage {
             quality: Quality {
                 scatter: methods.scatter.parse()?,
                 transmit: methods.transmit.parse()?,
+                curvature: methods.curvature.parse()?,
                 color: methods.color.parse()?,
                 wrinkles: methods.wrinkles.parse()?,
                 specular: methods.specular.parse()?,

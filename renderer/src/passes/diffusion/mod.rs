@@ -127,7 +127,7 @@ pub(crate) fn method(
     Ok(Some(match method.validate()? {
         ScatterMethod::None => Box::new(Unscattered),
         ScatterMethod::PreIntegrated(n) => {
-            Box::new(preintegrated::PreIntegrated::new(gpu, rasteriser, profile, n)?)
+            Box::new(preintegrated::PreIntegrated::new(gpu, profile, n)?)
         }
         ScatterMethod::Separable(n) => Box::new(separable::Separable::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenGauss(n) => Box::new(gauss::ScreenGauss::new(gpu, profile, n as usize)?),

@@ -72,7 +72,7 @@ pub(crate) mod reference;
 #[cfg(test)]
 mod tests;
 
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::{Vec3, Vec4};
 use rubor_rig::head::{EYE_RADIUS_MM, LIMBUS_UV, Material};
@@ -310,6 +310,8 @@ pub(crate) struct Shade {
     kernel: Kernel,
     /// Made by the first frame that lights points of the surface.
     samples_kernel: Option<(bool, Kernel)>,
+    /// Variants of the kernel for the rules of diffusion methods, by their names, each made by the first frame with it.
+    skin_light_kernels: Mutex<Vec<(&'static str, Arc<Kernel>)>>,
     /// Made by the first frame that shows a material of an author.
     authored_kernel: OnceLock<AuthoredKernels>,
     /// Whether shadow maps are floats and no depth textures.
@@ -340,6 +342,7 @@ impl Shade {
             kernel: Kernel::new(gpu, "shade", &program, "shade"),
             samples_kernel: None,
             stored_shadows,
+            skin_light_kernels: Mutex::default(),
             authored_kernel: OnceLock::new(),
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
                 label: Some("trilinear repeat"),
@@ -363,6 +366,22 @@ impl Shade {
         if self.directional_albedo.0 != method {
             self.directional_albedo = (method, upload_directional_albedo(gpu, method));
         }
+    }
+
+    /// The variant of the kernel with the rule of a name, made from `program` unless it exists.
+    pub(crate) fn skin_light_kernel(
+        &self,
+        gpu: &Gpu,
+        name: &'static str,
+        program: impl FnOnce() -> Program,
+    ) -> Arc<Kernel> {
+        let mut kernels = self.skin_light_kernels.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, kernel)) = kernels.iter().find(|(of, _)| *of == name) {
+            return kernel.clone();
+        }
+        let kernel = Arc::new(Kernel::new(gpu, "shade", &program(), "shade"));
+        kernels.push((name, kernel.clone()));
+        kernel
     }
 
     /// Shades the visible parts of heads. `into` takes the light of a first sample that this one may share.

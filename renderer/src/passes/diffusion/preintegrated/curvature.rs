@@ -60,7 +60,7 @@ impl Curvatures {
 
 impl Curvature {
     pub(super) fn new(gpu: &Gpu) -> Self {
-        let kernel = |entry| Kernel::new(gpu, "curvature", &program(), entry);
+        let kernel = |entry| Kernel::new(gpu, "scatter curvature", &program(), entry);
         Self { points: kernel("curvature_of_points"), smooth: kernel("smooth_curvature") }
     }
 

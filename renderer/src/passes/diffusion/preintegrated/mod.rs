@@ -43,8 +43,9 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-use rubor_rig::skin::kernel::SeparableKernel;
-use rubor_rig::skin::preintegrated::wave_shares;
+use std::sync::Arc;
+
+use rubor_rig::skin::preintegrated::{reach_mm, wave_shares};
 use rubor_rig::skin::profile::Profile;
 
 use self::curvature::{Curvature, Curvatures};
@@ -55,7 +56,6 @@ use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Kernel, Recorder};
 use crate::error::RenderError;
-use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::shade::{SkinLight, skin_light_program};
 use crate::scene::PosedHead;
 use crate::settings::CurvatureMethod;
@@ -63,8 +63,6 @@ use crate::settings::CurvatureMethod;
 const SKIN_LIGHT: Module = module!("skin_light", "skin_light.wesl");
 const TENSOR: Module = module!("skin_tensor", "tensor.wesl");
 
-/// Taps of the kernel that blurs relief.
-const TAPS: usize = 65;
 /// Meshes of the nets of furrows in `micro.wesl`, mm: the share of the coarser one is used for both, as it is seen from farther.
 const FURROWS_MM: f64 = 0.65;
 /// A length of relief at which a mix of one blurred map with the sharp one is to be right, mm: that of pores and lines.
@@ -95,15 +93,15 @@ pub(crate) fn program(by_channel: bool, on_screen: bool) -> Program {
 
 /// The method, ready for one profile.
 pub(crate) struct PreIntegrated {
-    rasteriser: Rasteriser,
     by_channel: bool,
-    profile_kernel: SeparableKernel,
+    profile: Profile,
+    reach_mm: f64,
     tables: Tables,
     params: Params,
     relief: Relief,
     curvature: Option<Curvature>,
-    /// The kernel of `shade`, made by the first frame, for a source of curvature.
-    kernel: Option<(CurvatureMethod, Kernel)>,
+    /// The kernel of `shade` of this frame.
+    kernel: Option<Arc<Kernel>>,
     heads: Vec<Prepared>,
 }
 
@@ -119,12 +117,7 @@ impl PreIntegrated {
     ///
     /// # Errors
     /// The profile has no finite width.
-    pub(crate) fn new(
-        gpu: &Gpu,
-        rasteriser: Rasteriser,
-        profile: &Profile,
-        maps: u32,
-    ) -> Result<Self, RenderError> {
+    pub(crate) fn new(gpu: &Gpu, profile: &Profile, maps: u32) -> Result<Self, RenderError> {
         let by_channel = maps == 3;
         let tables = Tables::new(gpu, profile)?;
         let rgb = |v: [f64; 3]| [v[0] as f32, v[1] as f32, v[2] as f32, 0.0];
@@ -144,9 +137,9 @@ impl PreIntegrated {
             blurred: rgb(blurred),
         };
         Ok(Self {
-            rasteriser,
             by_channel,
-            profile_kernel: SeparableKernel::of(profile, TAPS)?,
+            profile: profile.clone(),
+            reach_mm: reach_mm(profile)?,
             tables,
             params,
             relief: Relief::new(gpu, by_channel),
@@ -164,17 +157,21 @@ impl Diffusion for PreIntegrated {
 
     fn before_view(&mut self, r: &mut Recorder<'_>, frame: &Before<'_>) {
         let method = frame.quality.curvature;
-        if self.kernel.as_ref().is_none_or(|(of, _)| *of != method) {
-            let program = program(self.by_channel, method == CurvatureMethod::Screen)
-                .flag("stored_shadows", self.rasteriser.stores_depth());
-            self.kernel = Some((method, Kernel::new(r.gpu, "shade", &program, "shade")));
-        }
+        let on_screen = method == CurvatureMethod::Screen;
+        let name = match (self.by_channel, on_screen) {
+            (true, false) => "pre-integrated",
+            (true, true) => "pre-integrated, screen",
+            (false, false) => "pre-integrated:1",
+            (false, true) => "pre-integrated:1, screen",
+        };
+        let program = || program(self.by_channel, on_screen);
+        self.kernel = Some(frame.shade.skin_light_kernel(r.gpu, name, program));
         self.heads.truncate(frame.heads.len());
         for (i, head) in frame.heads.iter().enumerate() {
             let fits = |p: &Prepared| p.maps.as_ref().map(BlurredMaps::source) == relief::source_of(head);
             if !self.heads.get(i).is_some_and(fits) {
                 self.heads.truncate(i);
-                let maps = self.relief.blurred(r, head, &self.profile_kernel);
+                let maps = self.relief.blurred(r, head, &self.profile, self.reach_mm);
                 let params = Params {
                     first_blurred: maps.as_ref().map_or(0, |m| m.first_blurred),
                     relief_layer: maps.as_ref().map_or(0, |m| m.relief_layer),
@@ -185,13 +182,13 @@ impl Diffusion for PreIntegrated {
                 self.heads.push(Prepared { maps, curvatures: None, params });
             }
             let prepared = &mut self.heads[i];
-            if method == CurvatureMethod::Screen {
+            if on_screen {
                 prepared.curvatures = None;
             } else if !prepared.curvatures.as_ref().is_some_and(|c| c.fit(head)) {
                 prepared.curvatures = Some(Curvatures::new(r.gpu, head));
             }
         }
-        if method == CurvatureMethod::Mesh {
+        if !on_screen {
             let passes = self.curvature.get_or_insert_with(|| Curvature::new(r.gpu));
             let each: Vec<_> = (frame.heads.iter().zip(&self.heads))
                 .filter_map(|(head, prepared)| Some((head, prepared.curvatures.as_ref()?)))
@@ -217,7 +214,7 @@ impl Diffusion for PreIntegrated {
 impl SkinLight for PreIntegrated {
     fn kernel(&self) -> &Kernel {
         // The frame asks after `before_view`, which makes it.
-        &self.kernel.as_ref().expect("before_view comes first").1
+        self.kernel.as_ref().expect("before_view comes first")
     }
 
     fn resources<'a>(&'a self, head: &PosedHead<'a>) -> Vec<Resource<'a>> {

@@ -1,8 +1,7 @@
-//! Curvature of points on the CPU, in f64, from the definition: least squares by a general solver, rotations by
-//! axis and angle.
+//! Curvature of points on the CPU, in f64, from the definition: least squares by a general inverse, rotations by
+//! quaternions.
 
 use glam::{DMat3, DQuat, DVec3, Vec3};
-use nalgebra::{Matrix3, Vector3};
 use rubor_rig::deform::point_normals;
 use rubor_rig::head::Mesh;
 
@@ -39,26 +38,27 @@ pub(super) fn curvatures(mesh: &Mesh, points: &[Vec3], means: usize) -> Vec<DMat
 fn fitted(point: usize, neighbours: &[usize], points: &[Vec3], normals: &[DVec3]) -> DMat3 {
     let normal = normals[point];
     let (t, b) = normal.any_orthonormal_pair();
-    let (mut left, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
+    let (mut left, mut right) = (DMat3::ZERO, DVec3::ZERO);
     for other in neighbours {
         let way = 1e3 * (points[*other] - points[point]).as_dvec3();
         let turn = normals[*other] - normal;
         let weight = 1.0 / way.length_squared().max(1e-8);
         // S e = d, a row for each component.
         for (row, d) in [
-            (Vector3::new(way.dot(t), way.dot(b), 0.0), turn.dot(t)),
-            (Vector3::new(0.0, way.dot(t), way.dot(b)), turn.dot(b)),
+            (DVec3::new(way.dot(t), way.dot(b), 0.0), turn.dot(t)),
+            (DVec3::new(0.0, way.dot(t), way.dot(b)), turn.dot(b)),
         ] {
-            left += weight * row * row.transpose();
+            left += weight * outer(row, row);
             right += weight * d * row;
         }
     }
-    let trace = left.trace() - left[(1, 1)];
-    let Some(s) = left.lu().solve(&right).filter(|_| left.determinant() > 1e-4 * trace.powi(3)) else {
+    let edges = left.x_axis.x + left.z_axis.z;
+    if left.determinant() <= 1e-4 * edges.powi(3) {
         return DMat3::ZERO;
-    };
-    let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
-    s[0] * outer(t, t) + s[1] * (outer(t, b) + outer(b, t)) + s[2] * outer(b, b)
+    }
+    let s = left.inverse() * right;
+    s.x * outer(t, t) + s.y * (outer(t, b) + outer(b, t)) + s.z * outer(b, b)
 }
 
 /// Principal curvatures of a tensor, the larger first: the eigenvalues that are not that of the normal.

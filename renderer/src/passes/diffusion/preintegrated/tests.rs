@@ -19,7 +19,7 @@ use crate::settings::{
     AntialiasMethod, Look, Output, Quality, ScatterMethod, Settings, TransmitMethod, WrinkleMethod,
 };
 use crate::testing::{assert_layout, assert_workgroups, offsets, own_gpu, read_storage, recorded};
-use crate::tests::{WHITE_TABLE, dome, read_texels, read_vectors, render};
+use crate::tests::{WHITE_TABLE, dome, read_texels, render, renderer};
 use crate::{Camera, EnvironmentMap, FrameStats, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
 const MM: f32 = 1e-3;
@@ -137,14 +137,14 @@ fn found_curvatures(head: &Head) -> Option<Vec<DMat3>> {
 fn spheres_and_cylinders_have_their_curvature() {
     for (head, expected) in [
         (bare(sphere(20.0, 48)), [0.05, 0.05]),
-        (bare(sphere(4.0, 32)), [0.25, 0.25]),
+        (bare(sphere(4.0, 48)), [0.25, 0.25]),
         (bare(cylinder(15.0, 40)), [1.0 / 15.0, 0.0]),
     ] {
         let Some(found) = found_curvatures(&head) else { return };
         let mut compared = 0;
         for (tensor, p) in found.iter().zip(&head.mesh.points) {
             // Not the poles, whose triangles are slivers, nor the rims of the cylinder.
-            let is_inside = if expected[1] == 0.0 { p.y.abs() < 0.015 } else { p.y.abs() < 0.9 * p.length() };
+            let is_inside = if expected[1] == 0.0 { p.y.abs() < 0.015 } else { p.y.abs() < 0.7 * p.length() };
             if !is_inside {
                 continue;
             }
@@ -219,7 +219,7 @@ fn lamp(direction: Vec3, casts_shadow: bool) -> Light {
 struct Drawn {
     diffuse: Vec<[f32; 4]>,
     strength: Vec<f32>,
-    radiance: Vec<Vec3>,
+    radiance: Vec<[f32; 4]>,
     stats: FrameStats,
 }
 
@@ -239,8 +239,7 @@ impl Wanted {
     }
 }
 
-fn draw(head: &Head, state: &FaceState, lights: &[Light], wanted: &Wanted) -> Option<Drawn> {
-    let mut renderer = Renderer::new(own_gpu()?).unwrap();
+fn draw(renderer: &mut Renderer, head: &Head, state: &FaceState, lights: &[Light], wanted: &Wanted) -> Drawn {
     let on_gpu = HeadOnGpu::new(renderer.gpu(), head, &WHITE_TABLE).unwrap();
     let heads = [HeadInstance { head: &on_gpu, state, world_from_head: Mat4::IDENTITY }];
     let sky = wanted.sky.as_ref().map(|map| map.upload(renderer.gpu()));
@@ -262,13 +261,13 @@ fn draw(head: &Head, state: &FaceState, lights: &[Light], wanted: &Wanted) -> Op
         },
         look: Look { exposure: 1.0, ..Look::default() },
     };
-    let (_, stats) = render(&mut renderer, &scene, &settings).unwrap();
-    Some(Drawn {
-        diffuse: read_texels(&renderer, Channel::Diffuse),
-        strength: read_texels(&renderer, Channel::Albedo).iter().map(|t| t[3]).collect(),
-        radiance: read_vectors(&renderer, Channel::Radiance),
+    let (_, stats) = render(renderer, &scene, &settings).unwrap();
+    Drawn {
+        diffuse: read_texels(renderer, Channel::Diffuse),
+        strength: read_texels(renderer, Channel::Albedo).iter().map(|t| t[3]).collect(),
+        radiance: read_texels(renderer, Channel::Radiance),
         stats,
-    })
+    }
 }
 
 /// Root mean square difference of bare skin relative to that of the second.
@@ -285,12 +284,13 @@ fn relative_error(found: &Drawn, expected: &Drawn) -> f64 {
 
 #[test]
 fn a_sphere_is_lit_as_the_integral_says() {
+    let Some(mut renderer) = renderer() else { return };
     let radius = 10.0;
     let head = bare(sphere(radius, 96));
     let state = FaceState::neutral(&head);
     let light = lamp(Vec3::new(-1.0, 0.0, -0.2), true);
     let pixels = 48;
-    let Some(found) = draw(&head, &state, &[light], &Wanted::of(THREE, pixels, 22.0)) else { return };
+    let found = draw(&mut renderer, &head, &state, &[light], &Wanted::of(THREE, pixels, 22.0));
     let LightKind::Directional { direction } = light.kind else { panic!("a directional lamp") };
     let profile = Profile::deon_six();
     let mut compared = 0;
@@ -321,31 +321,34 @@ fn a_sphere_is_lit_as_the_integral_says() {
 
 #[test]
 fn error_to_the_reference_on_spheres_has_a_bound() {
-    // Bounds of the relative root mean square, of this method and, to compare, of no scattering.
-    for (radius, bound) in [(6.0, 0.05), (25.0, 0.05)] {
+    let Some(mut renderer) = renderer() else { return };
+    // Relative root mean square; where light goes far for the size of the sphere no scattering is much farther off.
+    for (radius, bound, factor) in [(6.0, 0.03, 0.4), (25.0, 0.01, 2.0)] {
         let head = bare(sphere(radius, 80));
         let state = FaceState::neutral(&head);
         let lights = [lamp(Vec3::new(-1.0, -0.1, -0.4), true)];
-        let draw = |scatter| draw(&head, &state, &lights, &Wanted::of(scatter, 24, 1.7 * radius));
-        let Some(reference) = draw(ScatterMethod::ReferenceSurface(8)) else { return };
-        let [found, none] =
-            [THREE, ScatterMethod::None].map(|m| relative_error(&draw(m).unwrap(), &reference));
-        assert!(found < bound && found < none, "{radius} mm: {found}, without scattering {none}");
+        let mut of =
+            |scatter| draw(&mut renderer, &head, &state, &lights, &Wanted::of(scatter, 24, 1.7 * radius));
+        let reference = of(ScatterMethod::ReferenceSurface(6));
+        let [found, none] = [THREE, ScatterMethod::None].map(|m| relative_error(&of(m), &reference));
+        let limits = found < bound && found < factor * none;
+        assert!(limits, "{radius} mm: {found}, without scattering {none}");
     }
 }
 
 #[test]
 fn on_a_plane_and_with_a_narrow_profile_light_is_lamberts() {
+    let Some(mut renderer) = renderer() else { return };
     let plane = bare(grid(8, 8, false, |u, v| 60.0 * Vec3::new(u - 0.5, 0.5 - v, 0.0)));
     let state = FaceState::neutral(&plane);
     let lights = [lamp(Vec3::new(-0.6, -0.3, -0.5), true)];
-    let draw_of = |head: &Head, state: &FaceState, scatter, profile: &Profile| {
+    let mut draw_of = |head: &Head, state: &FaceState, scatter, profile: &Profile| {
         let wanted = Wanted { profile: profile.clone(), ..Wanted::of(scatter, 24, 50.0) };
-        draw(head, state, &lights, &wanted)
+        draw(&mut renderer, head, state, &lights, &wanted)
     };
     let skin = Profile::deon_six();
-    let Some(none) = draw_of(&plane, &state, ScatterMethod::None, &skin) else { return };
-    let error = relative_error(&draw_of(&plane, &state, THREE, &skin).unwrap(), &none);
+    let none = draw_of(&plane, &state, ScatterMethod::None, &skin);
+    let error = relative_error(&draw_of(&plane, &state, THREE, &skin), &none);
     assert!(error < 2e-3, "{error}");
 
     let dome = dome();
@@ -353,9 +356,9 @@ fn on_a_plane_and_with_a_narrow_profile_light_is_lamberts() {
     let narrow = Profile { name: "narrow".into(), channels: std::array::from_fn(|_| narrow.clone()) };
     let mut state = FaceState::neutral(&dome);
     state.zones = vec![0.6];
-    let none = draw_of(&dome, &state, ScatterMethod::None, &narrow).unwrap();
+    let none = draw_of(&dome, &state, ScatterMethod::None, &narrow);
     for method in [ScatterMethod::PreIntegrated(1), THREE] {
-        let error = relative_error(&draw_of(&dome, &state, method, &narrow).unwrap(), &none);
+        let error = relative_error(&draw_of(&dome, &state, method, &narrow), &none);
         assert!(error < 0.01, "{method}: {error}");
     }
 }
@@ -390,30 +393,31 @@ fn waves(wavelength_mm: f32, in_wrinkles: bool) -> Head {
 
 #[test]
 fn relief_and_wrinkles_are_blurred_by_the_profile() {
+    let Some(mut renderer) = renderer() else { return };
     let profile = Profile::deon_six();
-    for (wavelength, in_wrinkles) in [(3.0, false), (10.0, false), (3.0, true)] {
+    for (wavelength, in_wrinkles) in [(3.0, false), (7.5, false), (3.0, true)] {
         let head = waves(wavelength, in_wrinkles);
         let mut state = FaceState::neutral(&head);
         state.zones = vec![1.0];
         let lights = [lamp(Vec3::new(-0.6, 0.0, -0.8), false)];
-        let amplitude = |scatter| {
-            let drawn = draw(&head, &state, &lights, &Wanted::of(scatter, 60, 30.0))?;
-            // The wave along rows, by its Fourier sum; 30 mm hold whole waves.
-            Some([0, 1, 2].map(|c| {
+        let mut amplitude = |scatter| {
+            let drawn = draw(&mut renderer, &head, &state, &lights, &Wanted::of(scatter, 120, 15.0));
+            // The wave along rows, by its Fourier sum; 15 mm hold whole waves, and pixels are finer than texels.
+            [0, 1, 2].map(|c| {
                 let (mut sine, mut cosine) = (0.0, 0.0);
                 for (i, t) in drawn.diffuse.iter().enumerate() {
-                    let x = (i % 60) as f32 * 0.5 + 0.25;
+                    let x = (i % 120) as f32 * 0.125 + 0.0625;
                     let phase = std::f32::consts::TAU * x / wavelength;
                     sine += t[c] * phase.sin();
                     cosine += t[c] * phase.cos();
                 }
                 f64::from(sine.hypot(cosine))
-            }))
+            })
         };
-        let Some(none) = amplitude(ScatterMethod::None) else { return };
+        let none = amplitude(ScatterMethod::None);
         let expected = wave_shares(&profile, f64::from(wavelength));
-        let three = amplitude(THREE).unwrap();
-        let one = amplitude(ScatterMethod::PreIntegrated(1)).unwrap();
+        let three = amplitude(THREE);
+        let one = amplitude(ScatterMethod::PreIntegrated(1));
         for c in 0..3 {
             let share = three[c] / none[c];
             assert!(
@@ -431,6 +435,7 @@ fn relief_and_wrinkles_are_blurred_by_the_profile() {
 
 #[test]
 fn the_edge_of_a_shadow_is_blurred_by_the_line_spread() {
+    let Some(mut renderer) = renderer() else { return };
     // Half of a plane in the shadow of a blind 30 mm before it.
     let mut mesh = grid(8, 8, false, |u, v| 120.0 * Vec3::new(u - 0.5, 0.5 - v, 0.0));
     let start = mesh.triangles.len() as u32;
@@ -445,25 +450,22 @@ fn the_edge_of_a_shadow_is_blurred_by_the_line_spread() {
     let head = bare(mesh);
     let state = FaceState::neutral(&head);
     for (slant, radius) in [(0.0f32, 0.0f32), (0.0, 0.05), (0.6, 0.02)] {
-        // The lamp leans along x, away from the blind, so the camera sees all of the edge.
-        let direction = Vec3::new(-0.5, slant, -1.0).normalize();
+        // The shadow falls beside the blind, where the camera sees its edge.
+        let direction = Vec3::new(0.5, slant, -1.0).normalize();
         let light = Light { radius, ..lamp(direction, true) };
         let pixels = 40;
-        let Some(found) = draw(&head, &state, &[light], &Wanted::of(THREE, pixels, 60.0)) else { return };
+        let found = draw(&mut renderer, &head, &state, &[light], &Wanted::of(THREE, pixels, 60.0));
         // The edge falls along the light; on the plane it stays parallel to y.
         let edge = 30.0 * f64::from(direction.x / -direction.z);
-        let penumbra = 30.0 / f64::from(-direction.z) * f64::from(radius) / f64::from(-direction.z)
-            * f64::from((1.0 - direction.y * direction.y).sqrt());
+        // As wide as the lamp's disk, and wider by the slant across the edge, which lies along y.
+        let [y, z] = [direction.y, -direction.z].map(f64::from);
+        let penumbra = 30.0 / z * f64::from(radius) * (1.0 - y * y).sqrt() / z;
         let profile = Profile::deon_six();
         let (mut sum, mut compared) = (0.0, 0);
         for (i, f) in found.diffuse.iter().enumerate() {
             let x = ((i % pixels as usize) as f64 + 0.5) * 60.0 / f64::from(pixels) - 30.0;
-            // The camera sees the blind on the left.
-            if x < 1.5 && found.strength[i] == 0.0 {
-                continue;
-            }
             let beside = x - edge;
-            if beside.abs() > 12.0 || x < 1.0 - 29.0 {
+            if beside.abs() > 12.0 || found.strength[i] == 0.0 {
                 continue;
             }
             let cosine = f64::from(-direction.z);
@@ -488,14 +490,17 @@ fn the_edge_of_a_shadow_is_blurred_by_the_line_spread() {
 
 #[test]
 fn the_sky_is_blurred_by_curvature() {
+    let Some(mut renderer) = renderer() else { return };
     let radius = 5.0;
     let head = bare(sphere(radius, 64));
     let state = FaceState::neutral(&head);
     // Of band 1 alone, and the mean.
     let sky = || Some(EnvironmentMap::from_fn(64, 32, |d| Vec3::splat(1.0 + d.y)));
-    let of = |scatter| draw(&head, &state, &[], &Wanted { sky: sky(), ..Wanted::of(scatter, 24, 9.0) });
-    let Some(none) = of(ScatterMethod::None) else { return };
-    let found = of(THREE).unwrap();
+    let mut of = |scatter| {
+        draw(&mut renderer, &head, &state, &[], &Wanted { sky: sky(), ..Wanted::of(scatter, 24, 6.0) })
+    };
+    let none = of(ScatterMethod::None);
+    let found = of(THREE);
     let profile = Profile::deon_six();
     for (f, n) in found.diffuse.iter().zip(&none.diffuse) {
         for (c, channel) in profile.channels.iter().enumerate() {
@@ -508,6 +513,7 @@ fn the_sky_is_blurred_by_curvature() {
 
 #[test]
 fn hostile_input_gives_finite_light() {
+    let Some(mut renderer) = renderer() else { return };
     let mut head = dome();
     // Triangles without area, and a point that nothing uses.
     let first = head.mesh.points[100];
@@ -525,28 +531,34 @@ fn hostile_input_gives_finite_light() {
         casts_shadow: true,
     };
     let lights = [inside, lamp(Vec3::X, true), lamp(Vec3::Z, true)];
-    for profile in [Profile::deon_six(), wide] {
-        for scatter in [ScatterMethod::PreIntegrated(1), THREE] {
-            for wrinkles in [WrinkleMethod::PartialDerivative, WrinkleMethod::Difference] {
-                let wanted = Wanted { profile: profile.clone(), wrinkles, ..Wanted::of(scatter, 27, 180.0) };
-                let Some(found) = draw(&head, &state, &lights, &wanted) else { return };
-                assert!(found.diffuse.iter().flatten().all(|v| v.is_finite() && *v >= -8192.0));
-                assert!(found.radiance.iter().all(|v| v.is_finite() && v.min_element() >= 0.0));
-            }
-        }
+    use WrinkleMethod::{Difference, PartialDerivative};
+    for (profile, scatter, wrinkles) in [
+        (&wide, THREE, PartialDerivative),
+        (&Profile::deon_six(), THREE, Difference),
+        (&wide, ScatterMethod::PreIntegrated(1), Difference),
+    ] {
+        let wanted = Wanted { profile: profile.clone(), wrinkles, ..Wanted::of(scatter, 27, 180.0) };
+        let found = draw(&mut renderer, &head, &state, &lights, &wanted);
+        assert!(found.diffuse.iter().flatten().all(|v| v.is_finite() && *v >= -8192.0));
+        assert!(found.radiance.iter().flatten().all(|v| v.is_finite() && *v >= 0.0));
+        assert!(found.radiance.iter().any(|v| v[1] > 0.0));
     }
 }
 
 #[test]
 fn memory_of_the_method_is_counted() {
+    let Some(mut renderer) = renderer() else { return };
     let head = waves(5.0, false);
     let state = FaceState::neutral(&head);
-    let bytes = |scatter| {
-        let drawn = draw(&head, &state, &[], &Wanted::of(scatter, 16, 50.0))?;
-        Some(drawn.stats.memory_bytes)
+    let mut bytes = |scatter| {
+        // The images of the frame before are dropped two frames later.
+        let mut frame = || draw(&mut renderer, &head, &state, &[], &Wanted::of(scatter, 16, 50.0)).stats;
+        [frame(), frame(), frame(), frame()].map(|stats| stats.memory_bytes)[3]
     };
-    let Some(none) = bytes(ScatterMethod::None) else { return };
-    let (one, three) = (bytes(ScatterMethod::PreIntegrated(1)).unwrap(), bytes(THREE).unwrap());
+    let none = bytes(ScatterMethod::None);
+    let [one, three] = [ScatterMethod::PreIntegrated(1), THREE].map(&mut bytes);
+    // What one method keeps is gone with the next.
+    assert_eq!(bytes(ScatterMethod::None), none);
     // 256 x 256 texels of 8 bytes with all levels, two layers more for each of two maps.
     assert!(three - one > 2 * 256 * 256 * 8 && one > none, "{none} {one} {three}");
 }
