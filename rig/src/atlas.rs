@@ -46,7 +46,9 @@ pub enum AtlasError {
     #[error("it has no skin")]
     NoSkin,
     /// Texture coordinates that span no area.
-    #[error("{percent:.0} % of its skin have no texture coordinates (their triangles have no area in the texture)")]
+    #[error(
+        "{percent:.0} % of its skin have no texture coordinates (their triangles have no area in the texture)"
+    )]
     NoCoordinates {
         /// Share of the skin's area, percent.
         percent: f64,
@@ -195,7 +197,8 @@ impl Islands {
                     skin.point_index(t, mine) == skin.point_index(other, theirs)
                         && skin.uv(t, mine).distance(skin.uv(other, theirs)) < 1e-6
                 };
-                let same_place = (meets(k, edge + 1) && meets(k + 1, edge)) || (meets(k, edge) && meets(k + 1, edge + 1));
+                let same_place =
+                    (meets(k, edge + 1) && meets(k + 1, edge)) || (meets(k, edge) && meets(k + 1, edge + 1));
                 if same_place && winding[t] * winding[other] > 0.0 {
                     is_joined[t][k] = true;
                     sets.join(t, other);
@@ -240,7 +243,10 @@ pub fn shared_texels(skin: &Skin<'_>, side: u32) -> f64 {
         let (low, high) = ((a.min(b).min(c) - 0.5).floor(), (a.max(b).max(c) - 0.5).ceil());
         let farthest = low.abs().max(high.abs()).max_element();
         // Also false for what is not a number.
-        if !(farthest < FARTHEST_TILE * f64::from(side)) || det == 0.0 || (high - low).max_element() > 2.0 * f64::from(side) {
+        if !(farthest < FARTHEST_TILE * f64::from(side))
+            || det == 0.0
+            || (high - low).max_element() > 2.0 * f64::from(side)
+        {
             continue;
         }
         for y in low.y as i32..=high.y as i32 {
@@ -394,7 +400,9 @@ impl Atlas {
     pub fn new(skin: &Skin<'_>, side: u32, reach_mm: f64) -> Result<Self, AtlasError> {
         let islands = Islands::new(skin)?;
         let pieces = pieces(skin, &islands);
-        let margin_of = |mm: f64| ((reach_mm / mm).ceil() as u32).clamp(LEAST_MARGIN, (side / MOST_MARGIN).max(LEAST_MARGIN));
+        let margin_of = |mm: f64| {
+            ((reach_mm / mm).ceil() as u32).clamp(LEAST_MARGIN, (side / MOST_MARGIN).max(LEAST_MARGIN))
+        };
         let fit = |mm: f64| pack(&pieces, side, mm, margin_of(mm));
         // Bisection for the finest texels that fit, on a logarithmic scale.
         let widest = pieces.iter().map(|p| p.size_mm.max_element()).fold(1e-6, f64::max);
@@ -511,8 +519,8 @@ impl Atlas {
             for k in (0..3).filter(|k| !islands.is_joined[t][*k]) {
                 let (a, b) = (self.texel(skin, t, k), self.texel(skin, t, k + 1));
                 let low = (a.min(b) - reach).max(DVec2::new(f64::from(r[0]), f64::from(r[1])));
-                let high = (a.max(b) + reach)
-                    .min(DVec2::new(f64::from(r[0] + r[2]), f64::from(r[1] + r[3])) - 1.0);
+                let high =
+                    (a.max(b) + reach).min(DVec2::new(f64::from(r[0] + r[2]), f64::from(r[1] + r[3])) - 1.0);
                 for y in low.y.ceil() as u32..=high.y.max(0.0) as u32 {
                     for x in low.x.ceil() as u32..=high.x.max(0.0) as u32 {
                         let slot = (y * self.side + x) as usize;

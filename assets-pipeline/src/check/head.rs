@@ -93,7 +93,8 @@ fn triangles(head: &Head, findings: &mut Vec<Finding>) {
     });
     let uvs: Vec<glam::Vec2> = corners.map(|v| mesh.vertices[*v as usize].uv).collect();
     if !uvs.is_empty() && uvs.iter().all(|uv| *uv == uvs[0]) {
-        let message = "the skin has no texture coordinates: every map shows one texel, texture-space cannot scatter";
+        let message =
+            "the skin has no texture coordinates: every map shows one texel, texture-space cannot scatter";
         findings.push(Finding::warning("mesh", message).fix("unwrap the mesh before import"));
         return;
     }
@@ -114,9 +115,8 @@ const SHARED_TEXELS: f64 = 0.002;
 pub fn layout(head: &Head) -> Vec<Finding> {
     let mesh = &head.mesh;
     let skin = mesh.parts.iter().filter(|p| p.material == Material::Skin);
-    let triangles: Vec<[u32; 3]> = (skin.flat_map(|p| p.triangles.clone()))
-        .map(|t| mesh.triangles[t as usize])
-        .collect();
+    let triangles: Vec<[u32; 3]> =
+        (skin.flat_map(|p| p.triangles.clone())).map(|t| mesh.triangles[t as usize]).collect();
     let skin = Skin { points: &mesh.points, vertices: &mesh.vertices, triangles: &triangles };
     let islands = match Islands::new(&skin) {
         Ok(islands) => islands,
@@ -137,7 +137,8 @@ pub fn layout(head: &Head) -> Vec<Finding> {
             "{:.1} % of the texels of the skin belong to several places{mirrored}: blood, wrinkles and pigment show in all of them",
             100.0 * shared
         );
-        findings.push(Finding::warning("mesh", message).fix("give every place of the skin texels of its own"));
+        findings
+            .push(Finding::warning("mesh", message).fix("give every place of the skin texels of its own"));
     }
     // The reach of light in skin; the margin does not matter here.
     if let Ok(atlas) = Atlas::new(&skin, LAYOUT_SIDE, 8.0)

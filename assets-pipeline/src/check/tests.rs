@@ -157,7 +157,10 @@ fn layouts_of_the_texture() {
     mirrored.mesh.vertices[3].uv = mirrored.mesh.vertices[1].uv;
     let found = messages(&mirrored);
     assert_eq!(found.len(), 1, "{found:?}");
-    assert!(found[0].contains("100.0 % of the texels") && found[0].contains("1 of 2 islands are mirrored"), "{found:?}");
+    assert!(
+        found[0].contains("100.0 % of the texels") && found[0].contains("1 of 2 islands are mirrored"),
+        "{found:?}"
+    );
     let mut bare = good();
     bare.mesh.vertices[3].uv = 0.5 * (bare.mesh.vertices[0].uv + bare.mesh.vertices[2].uv);
     let found = messages(&bare);

@@ -262,7 +262,9 @@ impl Settings {
         self.quality.scatter.validate().map_err(|e| out_of_range("quality.scatter", e))?;
         self.quality.antialias.validate().map_err(|e| out_of_range("quality.antialias", e))?;
         let (scatter, transmit) = (self.quality.scatter, self.quality.transmit);
-        if transmit == TransmitMethod::TranslucentShadowMap && !matches!(scatter, ScatterMethod::TextureSpace(_)) {
+        if transmit == TransmitMethod::TranslucentShadowMap
+            && !matches!(scatter, ScatterMethod::TextureSpace(_))
+        {
             return Err(SettingsError::Range {
                 setting: "quality.transmit".into(),
                 found: format!("{transmit} with {scatter}, which has no map of the light on all of the skin"),

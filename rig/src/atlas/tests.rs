@@ -44,13 +44,20 @@ fn tube() -> Grid {
     for y in 0..=rows {
         for i in 0..SIDES {
             let a = TAU * f64::from(i) / f64::from(SIDES);
-            let p = DVec3::new(RADIUS_MM * a.cos(), HEIGHT_MM * f64::from(y) / f64::from(rows), RADIUS_MM * a.sin());
+            let p = DVec3::new(
+                RADIUS_MM * a.cos(),
+                HEIGHT_MM * f64::from(y) / f64::from(rows),
+                RADIUS_MM * a.sin(),
+            );
             grid.points.push((1e-3 * p).as_vec3());
         }
     }
     for y in 0..=rows {
         for i in 0..=SIDES {
-            grid.vertex(y * SIDES + i % SIDES, [f64::from(i) / f64::from(SIDES), f64::from(y) / f64::from(rows)]);
+            grid.vertex(
+                y * SIDES + i % SIDES,
+                [f64::from(i) / f64::from(SIDES), f64::from(y) / f64::from(rows)],
+            );
         }
     }
     for y in 0..rows {
@@ -77,7 +84,13 @@ fn margins_continue_over_a_seam_and_are_reflected_at_an_open_border() {
         let Some(place) = place else { continue };
         let beside = !(0.0..=1.0).contains(&u);
         let beyond = !(0.0..=1.0).contains(&v);
-        let v = if v < 0.0 { -v } else if v > 1.0 { 2.0 - v } else { v };
+        let v = if v < 0.0 {
+            -v
+        } else if v > 1.0 {
+            2.0 - v
+        } else {
+            v
+        };
         // Around the corners of the sheet the nearest place is a corner, and so is the walk's start.
         let a = TAU * u;
         let expected = DVec3::new(RADIUS_MM * a.cos(), HEIGHT_MM * v, RADIUS_MM * a.sin());

@@ -14,7 +14,7 @@
 //! `shade`).
 //!
 //! Savings (Jimenez 2012 ch. 3): skin that faces away by more than 105 degrees is left out (culled), the map is halved
-//! until a texel is as wide as a pixel of the nearest part of the head (sized, eqs. 3.1 and 3.2 in powers of two), skin
+//! while a texel stays within half a pixel of the nearest part of the head (sized, eqs. 3.1 and 3.2 in powers of two), skin
 //! outside of the picture is left out (clipped, with a border as wide as light scatters).
 //!
 //! Differs from the sources: the layout is not the author's (see `rubor_rig::atlas`: even texels, margins that continue
@@ -31,11 +31,11 @@
 //! coordinates.
 
 pub(crate) mod plan;
-pub(crate) mod through;
 #[cfg(test)]
 mod reference;
 #[cfg(test)]
 mod tests;
+pub(crate) mod through;
 
 use std::sync::Arc;
 
@@ -247,23 +247,25 @@ impl TextureSpace {
         for head in frame.heads {
             let Some(layout) = self.layout(head) else { continue };
             let map = self.map(frame, head, layout);
-            let [light, stretch] = ["light map", "stretch map"].map(|label| r.image(label, ImageSpec::light([map.side; 2])));
+            let [light, stretch] =
+                ["light map", "stretch map"].map(|label| r.image(label, ImageSpec::light([map.side; 2])));
             numbers.push((r.uniform("map", &map), r.uniform("shade maps", &shade::params(&lighting, head))));
             let plan = plan(&self.gaussians, f64::from(map.mm_per_texel));
             maps.push(Maps { map, plan, light, stretch, blurred: Vec::new(), through: None });
         }
-        let each = frame.heads.iter().zip(maps.iter().zip(&numbers)).filter_map(|(head, (maps, (map, params)))| {
-            let layout = self.layout(head)?;
-            let mut resources = frame.shade.resources(&lighting, head, params);
-            resources.extend([
-                ("map", map.bound()),
-                ("places", layout.places.bound()),
-                ("texel_from_uv", layout.texel_from_uv.bound()),
-                ("light_out", maps.light.bound()),
-                ("stretch_out", maps.stretch.bound()),
-            ]);
-            Some((resources, pixel_groups([maps.map.side; 2])))
-        });
+        let each =
+            frame.heads.iter().zip(maps.iter().zip(&numbers)).filter_map(|(head, (maps, (map, params)))| {
+                let layout = self.layout(head)?;
+                let mut resources = frame.shade.resources(&lighting, head, params);
+                resources.extend([
+                    ("map", map.bound()),
+                    ("places", layout.places.bound()),
+                    ("texel_from_uv", layout.texel_from_uv.bound()),
+                    ("light_out", maps.light.bound()),
+                    ("stretch_out", maps.stretch.bound()),
+                ]);
+                Some((resources, pixel_groups([maps.map.side; 2])))
+            });
         r.dispatch_each(&self.light, each.collect::<Vec<_>>());
         self.maps = maps;
     }
@@ -292,13 +294,19 @@ impl TextureSpace {
             }
             let each: Vec<_> = (passes.iter())
                 .map(|(h, source, scratch, _, along, _)| {
-                    (blur_resources(&self.linear, &self.maps[*h].stretch, along, [source, scratch]), pixel_groups(scratch.size()))
+                    (
+                        blur_resources(&self.linear, &self.maps[*h].stretch, along, [source, scratch]),
+                        pixel_groups(scratch.size()),
+                    )
                 })
                 .collect();
             r.dispatch_each(&self.along_u, each);
             let each: Vec<_> = (passes.iter())
                 .map(|(h, _, scratch, blurred, _, across)| {
-                    (blur_resources(&self.linear, &self.maps[*h].stretch, across, [scratch, blurred]), pixel_groups(scratch.size()))
+                    (
+                        blur_resources(&self.linear, &self.maps[*h].stretch, across, [scratch, blurred]),
+                        pixel_groups(scratch.size()),
+                    )
                 })
                 .collect();
             r.dispatch_each(&self.across_u, each);
@@ -328,8 +336,9 @@ impl Layout {
     fn new(gpu: &Gpu, surface: &Arc<Surface>, side: u32, reach_mm: f64) -> Result<Self, String> {
         // Triangles of skin, and their numbers in the head's list.
         let skin = Material::Skin.number();
-        let numbers: Vec<u32> =
-            (0..surface.triangles.len() as u32).filter(|t| surface.triangles[*t as usize][3] == skin).collect();
+        let numbers: Vec<u32> = (0..surface.triangles.len() as u32)
+            .filter(|t| surface.triangles[*t as usize][3] == skin)
+            .collect();
         let triangles: Vec<[u32; 3]> = (numbers.iter())
             .map(|t| {
                 let [a, b, c, _] = surface.triangles[*t as usize];
@@ -376,13 +385,14 @@ fn nearest_pixel_mm(frame: &Before<'_>, head: &PosedHead<'_>) -> f32 {
     let (low, high) = head.head.bounds;
     let camera = head.world_from_head.inverse().transform_point3(frame.scene.camera.position);
     let distance = camera.distance(camera.clamp(low, high)) - ROOM_METRES;
-    let pixels_per_radian = 0.5 * frame.size[1] as f32 / (0.5 * frame.scene.camera.fov_degrees.to_radians()).tan();
+    let pixels_per_radian =
+        0.5 * frame.size[1] as f32 / (0.5 * frame.scene.camera.fov_degrees.to_radians()).tan();
     MM_PER_METRE * distance.max(0.0) / pixels_per_radian
 }
 
-/// Halvings of a map until its texels are as wide as a pixel (Jimenez 2012 eqs. 3.1 and 3.2, in powers of two).
+/// Halvings of a map while its texels stay as narrow as half a pixel (Jimenez 2012 eqs. 3.1 and 3.2, in powers of two).
 fn sized_level(mm_per_texel: f32, pixel_mm: f32) -> u32 {
-    let ratio = pixel_mm / mm_per_texel;
+    let ratio = 0.5 * pixel_mm / mm_per_texel;
     if ratio >= 1.0 { (ratio.log2().floor() as u32).min(MOST_LEVELS) } else { 0 }
 }
 
@@ -417,8 +427,7 @@ impl Diffusion for TextureSpace {
         // Images of the frame before may be used again.
         self.maps.clear();
         self.record_light(r, frame);
-        let margins: Vec<u32> =
-            frame.heads.iter().filter_map(|h| Some(self.layout(h)?.margin)).collect();
+        let margins: Vec<u32> = frame.heads.iter().filter_map(|h| Some(self.layout(h)?.margin)).collect();
         self.record_blurs(r, &margins);
         if frame.quality.transmit == TransmitMethod::TranslucentShadowMap {
             self.record_through(r, frame);
@@ -427,7 +436,13 @@ impl Diffusion for TextureSpace {
         }
     }
 
-    fn after_shading(&mut self, r: &mut Recorder<'_>, heads: &[PosedHead<'_>], seen: &Seen, lit: &Lit) -> Image {
+    fn after_shading(
+        &mut self,
+        r: &mut Recorder<'_>,
+        heads: &[PosedHead<'_>],
+        seen: &Seen,
+        lit: &Lit,
+    ) -> Image {
         if heads.is_empty() || self.maps.len() != heads.len() {
             return lit.irradiance.clone();
         }
@@ -468,7 +483,8 @@ impl Diffusion for TextureSpace {
 impl Maps {
     fn numbers(&self, head: u32) -> Gather {
         let mut weights = [[0.0; 4]; TERMS + 2];
-        let all = [self.plan.own, self.plan.unblurred].into_iter().chain(self.plan.steps.iter().map(|s| s.weights));
+        let all =
+            [self.plan.own, self.plan.unblurred].into_iter().chain(self.plan.steps.iter().map(|s| s.weights));
         for (slot, w) in weights.iter_mut().zip(all) {
             *slot = [w[0] as f32, w[1] as f32, w[2] as f32, 0.0];
         }

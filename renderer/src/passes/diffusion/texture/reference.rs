@@ -22,8 +22,8 @@ impl Texels {
             (0.0, 1.0, (1.0 - sx) * sy),
             (1.0, 1.0, sx * sy),
         ] {
-            let t = self.values
-                [clamped(fy + dy, self.size[1]) * self.size[0] + clamped(fx + dx, self.size[0])];
+            let t =
+                self.values[clamped(fy + dy, self.size[1]) * self.size[0] + clamped(fx + dx, self.size[0])];
             for c in 0..4 {
                 sum[c] += w * t[c];
             }

@@ -35,7 +35,7 @@ fn layouts_match_the_shaders() {
     let gather = offsets!(Gather; map as "map", head as "head", terms as "terms", weights as "weights");
     assert_layout(&gather_program(), "gather", "Params", size_of::<Gather>(), &gather);
     let params = offsets!(through::Params; map as "map", decay_mm as "decay_mm", first_lamp as "first_lamp",
-        terms as "terms", terms_of as "terms_of");
+        terms as "terms", narrow as "narrow", terms_of as "terms_of");
     assert_layout(&through::program(), "pass_through", "Through", size_of::<through::Params>(), &params);
 }
 
@@ -84,8 +84,7 @@ fn lines_are_those_of_the_reference_at_odd_sizes_with_holes() {
             if is_known { [v[0], v[1], v[2], 1.0] } else { [0.0; 4] }
         })
         .collect();
-    let stretch: Vec<[f64; 4]> =
-        (0..count).map(|_| [0, 1, 2, 3].map(|_| half(random.uniform()))).collect();
+    let stretch: Vec<[f64; 4]> = (0..count).map(|_| [0, 1, 2, 3].map(|_| half(random.uniform()))).collect();
     let single = |t: &[[f64; 4]]| -> Vec<[f32; 4]> { t.iter().map(|t| t.map(|v| v as f32)).collect() };
     let source = half_image(gpu, size, &single(&light));
     let stretch_image = half_image(gpu, size, &single(&stretch));
@@ -174,7 +173,11 @@ fn shaded_plane() -> Head {
     let start = head.mesh.triangles.len() as u32;
     head.mesh.triangles.push([vertex, vertex + 1, vertex + 2]);
     head.mesh.triangles.push([vertex, vertex + 2, vertex + 3]);
-    head.mesh.parts.push(Part { name: "shade".into(), material: Material::Teeth, triangles: start..start + 2 });
+    head.mesh.parts.push(Part {
+        name: "shade".into(),
+        material: Material::Teeth,
+        triangles: start..start + 2,
+    });
     head
 }
 
@@ -323,11 +326,8 @@ fn the_blur_keeps_its_width_where_the_surface_stretches_and_shears() {
         offsets: skin.iter().map(|p| f(head.mesh.points[*p as usize])).collect(),
         ..BlendShape::default()
     };
-    let shapes: [fn(Vec3) -> Vec3; 3] = [
-        |p| p,
-        |p| Vec3::new(-0.4 * p.x, 0.0, 0.0),
-        |p| Vec3::new(0.8 * p.y, 0.0, 0.0),
-    ];
+    let shapes: [fn(Vec3) -> Vec3; 3] =
+        [|p| p, |p| Vec3::new(-0.4 * p.x, 0.0, 0.0), |p| Vec3::new(0.8 * p.y, 0.0, 0.0)];
     let shapes = shapes.map(moved);
     for (shape, bound) in shapes.into_iter().zip([0.04, 0.04, 0.04]) {
         head.shapes = vec![shape];
@@ -338,7 +338,8 @@ fn the_blur_keeps_its_width_where_the_surface_stretches_and_shears() {
 
 /// A tube of skin of 20 mm radius along y; its seam lies at an angle in turns from +Z.
 fn tube(seam: f64) -> Head {
-    let at = |a: f64, y: f64| [20.0 * (TAU * (a + seam)).sin(), 80.0 * y - 40.0, 20.0 * (TAU * (a + seam)).cos()];
+    let at =
+        |a: f64, y: f64| [20.0 * (TAU * (a + seam)).sin(), 80.0 * y - 40.0, 20.0 * (TAU * (a + seam)).cos()];
     grid([64, 8], true, at, |a, y| [0.1 + 0.6 * a, 0.9 - 0.5 * y])
 }
 
@@ -364,9 +365,11 @@ fn a_seam_does_not_show() {
     // The same texels, one layout with the seam in view and one with it behind.
     let (seam, whole) = (of(0.0), of(0.5));
     let most = whole.diffuse.iter().map(|t| t[0]).fold(0.0, f32::max);
-    let worst = seam.diffuse.iter().zip(&whole.diffuse).map(|(a, b)| {
-        (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max)
-    });
+    let worst = seam
+        .diffuse
+        .iter()
+        .zip(&whole.diffuse)
+        .map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max));
     let worst = worst.fold(0.0, f32::max) / most;
     assert!(most > 0.1 && worst < 0.01, "{worst} of {most}");
 }
@@ -387,7 +390,8 @@ fn savings_do_not_show() {
             draw(&mut renderer, &head, &[0.0, 0.0], view, &lights, (64, quality))
         };
         let all = of(&[]);
-        for savings in [&[MapSaving::Culled][..], &[MapSaving::Clipped], &[MapSaving::Sized], &MapSaving::ALL] {
+        for savings in [&[MapSaving::Culled][..], &[MapSaving::Clipped], &[MapSaving::Sized], &MapSaving::ALL]
+        {
             let some = of(savings);
             let mut apart: Vec<f32> = (all.diffuse.iter().zip(&some.diffuse).zip(&all.albedo))
                 .filter(|(_, albedo)| albedo[3] > 0.0)
@@ -444,7 +448,8 @@ fn colour_before_scattering_leaves_an_even_colour_alone() {
 /// From 0 mm thickness at x = -50 to 11 mm at x = 50, seen from its flat side.
 fn wedge() -> Head {
     let mut head = grid([20, 10], false, |x, y| [100.0 * x - 50.0, 100.0 * y - 50.0, 0.0], |x, y| [x, y]);
-    let back = grid([20, 10], false, |x, y| [100.0 * x - 50.0, 50.0 - 100.0 * y, -11.0 * x], |x, y| [x, 2.0 + y]);
+    let back =
+        grid([20, 10], false, |x, y| [100.0 * x - 50.0, 50.0 - 100.0 * y, -11.0 * x], |x, y| [x, 2.0 + y]);
     let (points, vertices) = (head.mesh.points.len() as u32, head.mesh.vertices.len() as u32);
     head.mesh.points.extend(back.mesh.points);
     head.mesh.vertices.extend(back.mesh.vertices.iter().map(|v| Vertex { point: v.point + points, ..*v }));
@@ -476,13 +481,11 @@ fn a_wedge_lit_from_behind_follows_the_transmittance_of_its_gaussians() {
         for c in 0..3 {
             // An evenly lit plane at a distance; the lamp's light is that of the tilted back.
             let back = f64::from(strength) * cosine * entering(GLOSS[0], GLOSS[1], cosine as f32) / PI;
-            let passed = gaussians.iter().map(|g| g.weights[c] * (-0.5 * thickness.powi(2) / g.variance_mm2).exp());
+            let passed =
+                gaussians.iter().map(|g| g.weights[c] * (-0.5 * thickness.powi(2) / g.variance_mm2).exp());
             let expected = back * passed.sum::<f64>();
             let error = (f64::from(f[c]) - expected).abs();
-            if c == 0 && i / 40 == 20 {
-                println!("{thickness:.3} mm: {} of {expected}, {}", f[c], f64::from(f[c]) / expected);
-            }
-            assert!(true || error < 0.08 * expected + 0.004 * back, "{thickness} mm, {c}: {} not {expected}", f[c]);
+            assert!(error < 0.08 * expected + 0.004 * back, "{thickness} mm, {c}: {} not {expected}", f[c]);
             compared += 1;
         }
     }
@@ -502,19 +505,23 @@ fn heads_are_refused_with_the_reason_and_what_works_and_other_input_gives_no_nan
     for v in &mut head.mesh.vertices {
         v.uv = Vec2::ZERO;
     }
-    let upload = |renderer: &Renderer, head: &Head| HeadOnGpu::new(renderer.gpu(), head, &WHITE_TABLE).expect("it uploads");
+    let upload = |renderer: &Renderer, head: &Head| {
+        HeadOnGpu::new(renderer.gpu(), head, &WHITE_TABLE).expect("it uploads")
+    };
     let state = FaceState::neutral(&head);
     let bare = upload(&renderer, &head);
     let refused = draw_with(&mut renderer, &[(&bare, &state)], view, &lights, 16, quality(method));
     let message = refused.err().expect("it has no coordinates").to_string();
     assert!(
-        message.starts_with("texture-space:64 cannot draw head 1: 100 % of its skin have no texture coordinates")
-            && message.contains("separable:5")
+        message.starts_with(
+            "texture-space:64 cannot draw head 1: 100 % of its skin have no texture coordinates"
+        ) && message.contains("separable:5")
             && message.contains("reference-surface"),
         "{message}"
     );
     // Another method draws it.
-    draw_with(&mut renderer, &[(&bare, &state)], view, &lights, 16, quality(ScatterMethod::Separable(5))).expect("it draws");
+    draw_with(&mut renderer, &[(&bare, &state)], view, &lights, 16, quality(ScatterMethod::Separable(5)))
+        .expect("it draws");
 
     // A lamp inside, a triangle without area, and a profile wider than the head.
     let mut head = dome();
@@ -544,8 +551,9 @@ fn heads_are_refused_with_the_reason_and_what_works_and_other_input_gives_no_nan
         let mut quality = quality(method);
         quality.transmit = transmit;
         quality.profile = wide.clone().into();
-        let drawn = draw_with(&mut renderer, &[(&on_gpu, &state), (&on_gpu, &state)], view, &[inside], 24, quality)
-            .expect("it draws");
+        let drawn =
+            draw_with(&mut renderer, &[(&on_gpu, &state), (&on_gpu, &state)], view, &[inside], 24, quality)
+                .expect("it draws");
         assert!(drawn.diffuse.iter().flatten().all(|v| v.is_finite()), "{transmit}");
     }
     // Translucent shadow maps need maps of light.
@@ -553,7 +561,10 @@ fn heads_are_refused_with_the_reason_and_what_works_and_other_input_gives_no_nan
     quality.transmit = TransmitMethod::TranslucentShadowMap;
     let refused = draw_with(&mut renderer, &[(&on_gpu, &state)], view, &lights, 16, quality);
     let message = refused.err().expect("it has no maps").to_string();
-    assert!(message.contains("translucent-shadow-map with separable:5") && message.contains("texture-space"), "{message}");
+    assert!(
+        message.contains("translucent-shadow-map with separable:5") && message.contains("texture-space"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -583,5 +594,6 @@ fn memory_is_that_of_the_method_in_use() {
 
 #[test]
 fn maps_shrink_with_the_distance() {
-    assert_eq!([0.0, 0.1, 0.34, 0.35, 0.7, 2.0, 100.0].map(|pixel| sized_level(0.35, pixel)), [0, 0, 0, 0, 1, 2, 3]);
+    let levels = [0.0, 0.1, 1.39, 1.41, 2.9, 5.7, 100.0].map(|pixel| sized_level(0.35, pixel));
+    assert_eq!(levels, [0, 0, 0, 1, 2, 3, 3]);
 }

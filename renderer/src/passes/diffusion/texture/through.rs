@@ -53,7 +53,7 @@ pub(crate) struct Params {
     pub(crate) decay_mm: f32,
     pub(crate) first_lamp: u32,
     pub(crate) terms: u32,
-    pub(crate) padding: u32,
+    pub(crate) narrow: u32,
     pub(crate) terms_of: [[f32; 4]; TERMS],
 }
 
@@ -77,7 +77,8 @@ impl Through {
     fn lamp_ids(&self, r: &mut Recorder<'_>, frame: &Before<'_>) -> Image {
         // Half of a shadow map: it has no edges that would show.
         let side = (frame.quality.shadow_size / 2).max(1);
-        let shadowed: Vec<_> = frame.light.lights.iter().filter(|l| l.shape[1] >= 0.0 && l.shape[3] > 0.0).collect();
+        let shadowed: Vec<_> =
+            frame.light.lights.iter().filter(|l| l.shape[1] >= 0.0 && l.shape[3] > 0.0).collect();
         let layers = frame.light.shadows.texture().depth_or_array_layers();
         let spec = ImageSpec::attachment([side; 2], wgpu::TextureFormat::R32Uint).layers(layers);
         let all = r.image("lamp ids", spec.also(wgpu::TextureUsages::COPY_DST));
@@ -117,10 +118,16 @@ impl TextureSpace {
             transmittance: None,
             quality: frame.quality,
         };
-        let lamps = frame.light.lights.iter().rposition(|l| l.shape[1] >= 0.0 && l.shape[3] > 0.0).map_or(0, |i| i + 1);
+        let lamps = frame
+            .light
+            .lights
+            .iter()
+            .rposition(|l| l.shape[1] >= 0.0 && l.shape[3] > 0.0)
+            .map_or(0, |i| i + 1);
         let thickness_maps = lamps.min(MAX_LIGHTS).div_ceil(LAMPS_A_MAP).max(1);
         for (h, head) in frame.heads.iter().enumerate() {
-            let Some(layout) = self.layouts.iter().find(|l| std::sync::Arc::ptr_eq(&l.surface, &head.head.surface))
+            let Some(layout) =
+                self.layouts.iter().find(|l| std::sync::Arc::ptr_eq(&l.surface, &head.head.surface))
             else {
                 continue;
             };
@@ -128,16 +135,15 @@ impl TextureSpace {
             let size = [maps.map.side >> LEVEL; 2];
             let shade_params = r.uniform("shade through", &shade::params(&lighting, head));
             let decay_mm = decay_mm(&self.gaussians);
-            let first = maps.plan.steps.len();
-            let blurred = &self.gaussians[self.gaussians.len() - first..];
+            let terms = maps.plan.steps.len();
             let params = |first_lamp: usize| Params {
                 map: maps.map,
                 decay_mm,
                 first_lamp: first_lamp as u32,
-                terms: first as u32,
-                padding: 0,
+                terms: terms as u32,
+                narrow: (self.gaussians.len() - terms) as u32,
                 terms_of: std::array::from_fn(|i| {
-                    blurred.get(i).map_or([0.0, 0.0, 0.0, 1.0], |g| {
+                    self.gaussians.get(i).map_or([0.0, 0.0, 0.0, 1.0], |g| {
                         let [r, g_, b] = g.weights.map(|w| w as f32);
                         [r, g_, b, g.variance_mm2 as f32]
                     })
@@ -158,18 +164,23 @@ impl TextureSpace {
             };
             let deviation_mm = self.gaussians.get(THICKNESS_BLUR).map_or(0.0, |g| g.variance_mm2.sqrt());
             for numbers in &all {
-                let [sharp, scratch, smooth] =
-                    ["thickness", "thickness scratch", "thickness"].map(|label| r.image(label, ImageSpec::light(size)));
+                let [sharp, scratch, smooth] = ["thickness", "thickness scratch", "thickness"]
+                    .map(|label| r.image(label, ImageSpec::light(size)));
                 let mut resources = common();
                 resources.extend([("through", numbers.bound()), ("thickness_out", sharp.bound())]);
                 r.dispatch(&through.thickness, &resources, pixel_groups(size));
-                let blur = r.uniform("blur", &Blur {
-                    deviation_mm: deviation_mm as f32,
-                    most_texels: (layout.margin >> maps.map.level).max(1) as f32,
-                    source_scale: 1.0 / (1u32 << LEVEL) as f32,
-                    level: LEVEL,
-                });
-                for (kernel, images) in [(&self.along_u, [&sharp, &scratch]), (&self.across_u, [&scratch, &smooth])] {
+                let blur = r.uniform(
+                    "blur",
+                    &Blur {
+                        deviation_mm: deviation_mm as f32,
+                        most_texels: (layout.margin >> maps.map.level).max(1) as f32,
+                        source_scale: 1.0 / (1u32 << LEVEL) as f32,
+                        level: LEVEL,
+                    },
+                );
+                for (kernel, images) in
+                    [(&self.along_u, [&sharp, &scratch]), (&self.across_u, [&scratch, &smooth])]
+                {
                     let resources = blur_resources(&self.linear, &maps.stretch, &blur, images);
                     r.dispatch(kernel, &resources, pixel_groups(size));
                 }
@@ -178,9 +189,12 @@ impl TextureSpace {
             let out = r.image("through", ImageSpec::light(size));
             let mut resources = common();
             resources.extend([("through", all[0].bound()), ("through_out", out.bound())]);
-            for (i, name) in ["thickness_0", "thickness_1", "thickness_2"].into_iter().enumerate().take(THICKNESS_MAPS) {
+            for (i, name) in
+                ["thickness_0", "thickness_1", "thickness_2"].into_iter().enumerate().take(THICKNESS_MAPS)
+            {
                 resources.push((name, thickness[i.min(thickness.len() - 1)].bound()));
             }
+            resources.push(("map_0", maps.light.bound()));
             for (i, name) in super::MAP_NAMES.into_iter().enumerate() {
                 resources.push((name, maps.blurred.get(i).unwrap_or(&maps.light).bound()));
             }
