@@ -379,7 +379,8 @@ impl Shade {
         if let Some((_, kernel)) = kernels.iter().find(|(of, _)| *of == name) {
             return kernel.clone();
         }
-        let kernel = Arc::new(Kernel::new(gpu, "shade", &program(), "shade"));
+        let program = program().flag("stored_shadows", self.stored_shadows);
+        let kernel = Arc::new(Kernel::new(gpu, "shade", &program, "shade"));
         kernels.push((name, kernel.clone()));
         kernel
     }

@@ -44,8 +44,9 @@ pub(super) fn line(source: &Texels, halvings: u32, deviation: impl Fn(usize, usi
             let d = deviation(x, y);
             let middle = [(x as f64 + 0.5) * scale, (y as f64 + 0.5) * scale];
             let tap = |i: f64| source.at(middle[0] + i * TAP_STEP * d[0], middle[1] + i * TAP_STEP * d[1]);
-            let mut sum = tap(0.0).map(|v| v * weights[0]);
-            let is_known = sum[3] > 0.0;
+            let own = tap(0.0);
+            let is_known = own[3] >= 0.1;
+            let mut sum = own.map(|v| v * weights[0]);
             for (i, w) in weights.iter().enumerate().skip(1) {
                 for side in [-1.0, 1.0] {
                     let t = tap(side * i as f64);

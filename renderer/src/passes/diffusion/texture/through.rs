@@ -54,7 +54,7 @@ pub(crate) struct Params {
     pub(crate) decay_mm: f32,
     pub(crate) first_lamp: u32,
     pub(crate) terms: u32,
-    pub(crate) padding: u32,
+    pub(crate) narrow: u32,
     pub(crate) terms_of: [[f32; 4]; TERMS],
 }
 
@@ -139,16 +139,15 @@ impl TextureSpace {
             let size = [maps.map.side >> LEVEL; 2];
             let shade_params = r.uniform("shade through", &shade::params(&lighting, head));
             let decay_mm = decay_mm(&self.gaussians);
-            let first = maps.plan.steps.len();
-            let blurred = &self.gaussians[self.gaussians.len() - first..];
+            let terms = maps.plan.steps.len();
             let params = |first_lamp: usize| Params {
                 map: maps.map,
                 decay_mm,
                 first_lamp: first_lamp as u32,
-                terms: first as u32,
-                padding: 0,
+                terms: terms as u32,
+                narrow: (self.gaussians.len() - terms) as u32,
                 terms_of: std::array::from_fn(|i| {
-                    blurred.get(i).map_or([0.0, 0.0, 0.0, 1.0], |g| {
+                    self.gaussians.get(i).map_or([0.0, 0.0, 0.0, 1.0], |g| {
                         let [r, g_, b] = g.weights.map(|w| w as f32);
                         [r, g_, b, g.variance_mm2 as f32]
                     })
@@ -199,6 +198,7 @@ impl TextureSpace {
             {
                 resources.push((name, thickness[i.min(thickness.len() - 1)].bound()));
             }
+            resources.push(("map_0", maps.light.bound()));
             for (i, name) in super::MAP_NAMES.into_iter().enumerate() {
                 resources.push((name, maps.blurred.get(i).unwrap_or(&maps.light).bound()));
             }
