@@ -11,15 +11,8 @@ use super::*;
 use crate::channels::Channel;
 use crate::passes::shade::directional_albedo::entering;
 use crate::settings::{AntialiasMethod, Look, Output, Quality, Settings};
-<<<<<<< HEAD
-use crate::testing::{
-    assert_layout, assert_workgroups, gpu, half_image, offsets, own_gpu, read_image, recorded,
-};
-use crate::tests::{WHITE_TABLE, dome, read_texels, render};
-=======
 use crate::testing::{assert_layout, assert_workgroups, gpu, half_image, offsets, read_image, recorded};
 use crate::tests::{WHITE_TABLE, dome, read_texels, render, renderer};
->>>>>>> texture-space
 use crate::{Camera, FrameStats, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
 const MM: f32 = 1e-3;
@@ -262,23 +255,13 @@ fn quality(scatter: ScatterMethod) -> Quality {
 }
 
 fn draw(
-<<<<<<< HEAD
-=======
     renderer: &mut Renderer,
->>>>>>> texture-space
     head: &Head,
     shapes: &[f32],
     camera: Camera,
     lights: &[Light],
-<<<<<<< HEAD
-    pixels: u32,
-    quality: Quality,
-) -> Option<Drawn> {
-    let mut renderer = Renderer::new(own_gpu()?).expect("the passes compile");
-=======
     (pixels, quality): (u32, Quality),
 ) -> Drawn {
->>>>>>> texture-space
     let on_gpu = HeadOnGpu::new(renderer.gpu(), head, &WHITE_TABLE).expect("it uploads");
     let mut state = FaceState::neutral(head);
     state.shapes = shapes.to_vec();
@@ -406,17 +389,10 @@ fn savings_do_not_show() {
             quality.map_savings = savings.to_vec();
             draw(&mut renderer, &head, &[0.0, 0.0], view, &lights, (64, quality))
         };
-<<<<<<< HEAD
-        let Some(all) = of(&[]) else { return };
-        for savings in [&[MapSaving::Culled][..], &[MapSaving::Clipped], &[MapSaving::Sized], &MapSaving::ALL]
-        {
-            let some = of(savings).expect("it draws");
-=======
         let all = of(&[]);
         for savings in [&[MapSaving::Culled][..], &[MapSaving::Clipped], &[MapSaving::Sized], &MapSaving::ALL]
         {
             let some = of(savings);
->>>>>>> texture-space
             let mut apart: Vec<f32> = (all.diffuse.iter().zip(&some.diffuse).zip(&all.albedo))
                 .filter(|(_, albedo)| albedo[3] > 0.0)
                 .map(|((a, b), _)| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max))
@@ -489,14 +465,8 @@ fn a_wedge_lit_from_behind_follows_the_transmittance_of_its_gaussians() {
     quality.transmit = TransmitMethod::TranslucentShadowMap;
     let (pixels, strength) = (40, 100.0);
     let view = camera([0.0, 0.0, 300.0], (2.0 * (50.0f32 / 300.0).atan()).to_degrees());
-<<<<<<< HEAD
-    let Some(found) = draw(&wedge(), &[], view, &[sun(Vec3::Z, strength)], pixels, quality.clone()) else {
-        return;
-    };
-=======
     let lights = [sun(Vec3::Z, strength)];
     let found = draw(&mut renderer, &wedge(), &[], view, &lights, (pixels, quality.clone()));
->>>>>>> texture-space
     let profile = Profile::deon_six();
     let gaussians = gauss::gaussians(&profile, TERMS).expect("it is a sum of six");
     let cosine = 1.0 / 0.11f64.hypot(1.0);
@@ -624,13 +594,6 @@ fn memory_is_that_of_the_method_in_use() {
 
 #[test]
 fn maps_shrink_with_the_distance() {
-<<<<<<< HEAD
-    assert_eq!(
-        [0.0, 0.1, 0.34, 0.35, 0.7, 2.0, 100.0].map(|pixel| sized_level(0.35, pixel)),
-        [0, 0, 0, 0, 1, 2, 3]
-    );
-=======
     let levels = [0.0, 0.1, 1.39, 1.41, 2.9, 5.7, 100.0].map(|pixel| sized_level(0.35, pixel));
     assert_eq!(levels, [0, 0, 0, 1, 2, 3, 3]);
->>>>>>> texture-space
 }
