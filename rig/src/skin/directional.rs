@@ -127,11 +127,8 @@ impl DirectionalNumbers {
         let square = x.length_squared();
         // Normal of the mirror plane, at right angles to the way (eq. 22): the normal at the entry where there is none.
         let tilted = normal_in * square - x * x.dot(normal_in);
-        let mirror = if tilted.length_squared() > 1e-12 * square * square {
-            tilted.normalize()
-        } else {
-            normal_in
-        };
+        let mirror =
+            if tilted.length_squared() > 1e-12 * square * square { tilted.normalize() } else { normal_in };
         let source_v = 2.0 * self.a_e * self.d_e_mm * mirror;
         let direction_v = refracted - 2.0 * refracted.dot(mirror) * mirror;
         let mu = -normal_out.dot(refracted);

@@ -369,8 +369,7 @@ impl Shade {
     /// Makes the resources of [`Shade::record_samples`]; `with_normals` if each light is followed by the smooth normal.
     pub(crate) fn prepare_samples(&mut self, gpu: &Gpu, with_normals: bool) {
         if self.samples_kernel.as_ref().is_none_or(|(normals, _)| *normals != with_normals) {
-            let kernel =
-                Kernel::new(gpu, "light samples", &samples_program(with_normals), "light_samples");
+            let kernel = Kernel::new(gpu, "light samples", &samples_program(with_normals), "light_samples");
             self.samples_kernel = Some((with_normals, kernel));
         }
     }

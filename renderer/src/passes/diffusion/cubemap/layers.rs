@@ -46,7 +46,10 @@ impl Layer {
         let [right, up] = basis(forward, up);
         let range = |axis: Vec3| {
             let along = corners.map(|c| c.dot(axis));
-            (along.into_iter().fold(f32::INFINITY, f32::min), along.into_iter().fold(f32::NEG_INFINITY, f32::max))
+            (
+                along.into_iter().fold(f32::INFINITY, f32::min),
+                along.into_iter().fold(f32::NEG_INFINITY, f32::max),
+            )
         };
         let [x, y, z] = [right, up, forward].map(range);
         let half = |(low, high): (f32, f32)| 0.5 * (high - low);

@@ -252,10 +252,7 @@ impl DipoleCubemap {
             samples,
             profile: profile.clone(),
             fixes: Fixes::ALL,
-            draw: [
-                kernel("scatter: depth", &draw, "draw_depth"),
-                kernel("scatter: ids", &draw, "draw_ids"),
-            ],
+            draw: [kernel("scatter: depth", &draw, "draw_depth"), kernel("scatter: ids", &draw, "draw_ids")],
             light: kernel("scatter: light", &light_program(), "light_layers"),
             gather: kernel("scatter: disks", &gather_program(false, is_directional), "gather_layers"),
             refine: None,
@@ -498,8 +495,13 @@ impl DipoleCubemap {
             ids: r.image("no ids", ImageSpec::attachment([1, 1], wgpu::TextureFormat::R32Uint)),
             depth: r.image("no depth", ImageSpec::attachment([1, 1], wgpu::TextureFormat::Depth32Float)),
         };
-        let lighting =
-            Lighting { light: frame.light, seen: &seen, first: None, transmittance: None, quality: frame.quality };
+        let lighting = Lighting {
+            light: frame.light,
+            seen: &seen,
+            first: None,
+            transmittance: None,
+            quality: frame.quality,
+        };
         let params = r.uniform("shade layers", &shade::params(&lighting, head));
         let mut resources = frame.shade.resources(&lighting, head, &params);
         resources.extend([
@@ -534,7 +536,8 @@ impl DipoleCubemap {
             None => &self.gather,
         };
         r.dispatch(kernel, &resources, [x, y, AXES as u32]);
-        let smoothed = r.image("smooth far light", array(wgpu::TextureFormat::Rgba16Float).layers(AXES as u32));
+        let smoothed =
+            r.image("smooth far light", array(wgpu::TextureFormat::Rgba16Float).layers(AXES as u32));
         let resources = [
             ("cube", cube.bound()),
             ("texels", texels.bound()),

@@ -65,8 +65,7 @@ impl Texels<'_> {
         if at.min_element() < 0.0 || at.max_element() >= side as f64 {
             return None;
         }
-        let [z, rg, b_strength, normal] =
-            self.packed[(layer * side + at.y as usize) * side + at.x as usize];
+        let [z, rg, b_strength, normal] = self.packed[(layer * side + at.y as usize) * side + at.x as usize];
         let snorm = |bits: u32| f64::from(bits as u16 as i16).max(-32767.0) / 32767.0;
         let p = DVec2::new(snorm(normal), snorm(normal >> 16));
         let up = 1.0 - p.x.abs() - p.y.abs();
@@ -126,7 +125,8 @@ impl Texels<'_> {
             let k = profile.reflectance(r.max(1e-6));
             if r < reach { DVec3::from_array([0, 1, 2].map(|c| k[c] / total[c])) } else { DVec3::ZERO }
         };
-        let beyond = |r: f64| DVec3::from_array([0, 1, 2].map(|c| profile.channels[c].mass_beyond(r) / total[c]));
+        let beyond =
+            |r: f64| DVec3::from_array([0, 1, 2].map(|c| profile.channels[c].mass_beyond(r) / total[c]));
         let mean = |v: DVec3| v.element_sum() / 3.0;
         let windowed = |r: f64| window([f64::from(cube.near_start_mm), f64::from(cube.near_end_mm)], r);
         let directional = profile.directional();
@@ -134,7 +134,9 @@ impl Texels<'_> {
         let to_viewer = layer.to_viewer(position);
         let cosine = own.normal.dot(to_viewer);
         let across = own.normal - to_viewer * cosine;
-        let shrinks = cube.fixes & Fixes { has_bias: false, shrinks_to_axis: false, weighs_by_facing: false, ..Fixes::ALL }.bits() != 0;
+        let shrinks = cube.fixes
+            & Fixes { has_bias: false, shrinks_to_axis: false, weighs_by_facing: false, ..Fixes::ALL }.bits()
+            != 0;
         let center = position - if shrinks { 1e-3 * f64::from(cube.lamp_shrink_mm) } else { 0.0 } * across;
         let reach_mm = reach * own.strength;
         let behind = |p: DVec3| {
@@ -142,7 +144,8 @@ impl Texels<'_> {
             self.texel(self.at(ndc), index).map_or(1e6, |t| 1e3 * (z - t.z))
         };
         let e = if to_viewer.x.abs() > 0.7 { DVec3::Y } else { DVec3::X };
-        let tilt = if across.length_squared() > 1e-6 { across.normalize() } else { to_viewer.cross(e).normalize() };
+        let tilt =
+            if across.length_squared() > 1e-6 { across.normalize() } else { to_viewer.cross(e).normalize() };
         let beside = to_viewer.cross(tilt);
         let depth_mm = behind(center);
         if depth_mm.abs() >= reach_mm {
@@ -187,7 +190,8 @@ impl Texels<'_> {
             let Some(t) = self.texel(at, index).filter(|t| t.strength > 0.0 && z > 0.0) else { continue };
             let step = layer.world(ndc, t.z) - layer.world(self.ndc(at.floor() + 0.5), t.z);
             let steepest = 4.0 * step.length();
-            let slope = (-t.normal.dot(step) / t.normal.dot(xyz(layer.forward)).min(-0.25)).clamp(-steepest, steepest);
+            let slope = (-t.normal.dot(step) / t.normal.dot(xyz(layer.forward)).min(-0.25))
+                .clamp(-steepest, steepest);
             let entry = layer.world(ndc, t.z + slope);
             let way = 1e3 * (position - entry) / own.strength;
             let r = way.length();
@@ -205,7 +209,8 @@ impl Texels<'_> {
                     let cosine = t.normal.dot(to_light).max(0.0);
                     let inside = (1.0 - (1.0 - cosine * cosine) / (eta * eta)).max(0.0);
                     let ray = ((cosine / eta - inside.sqrt()) * t.normal - to_light / eta).normalize();
-                    let passage = Passage { way_mm: way, normal_in: t.normal, normal_out: own.normal, refracted: ray };
+                    let passage =
+                        Passage { way_mm: way, normal_in: t.normal, normal_out: own.normal, refracted: ray };
                     DVec3::from_array([0, 1, 2].map(|c| dipoles[c].exitance(&passage) / total[c]))
                 }
                 _ => r_of(r),

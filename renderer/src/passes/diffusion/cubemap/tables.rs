@@ -77,9 +77,8 @@ impl Tables {
         let window_mm = WINDOW.map(|w| w * near_mm);
         let last = (ENTRIES - 1) as f64;
         let radius = |i: f64| half_width_mm * (i / last).powi(2);
-        let beyond_of = |r: f64| -> [f64; 3] {
-            std::array::from_fn(|c| profile.channels[c].mass_beyond(r) / total[c])
-        };
+        let beyond_of =
+            |r: f64| -> [f64; 3] { std::array::from_fn(|c| profile.channels[c].mass_beyond(r) / total[c]) };
         let beyond: Vec<[f64; 3]> = (0..ENTRIES).map(|i| beyond_of(radius(i as f64))).collect();
         let mean: Vec<f64> = beyond.iter().map(|b| b.iter().sum::<f64>() / 3.0).collect();
         let inverse = |share: f64| {

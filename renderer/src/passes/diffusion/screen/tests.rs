@@ -272,10 +272,7 @@ fn shaders_and_structs_are_what_both_sides_count_on() {
         );
     }
     for directional in [false, true] {
-        assert_workgroups(
-            &surface::program(directional),
-            &[("gather", [8, 8, 1]), ("finish", [8, 8, 1])],
-        );
+        assert_workgroups(&surface::program(directional), &[("gather", [8, 8, 1]), ("finish", [8, 8, 1])]);
     }
     assert_workgroups(&surface::normals_program(), &[("pixel_normals", [8, 8, 1])]);
     assert_layout(
@@ -288,9 +285,7 @@ fn shaders_and_structs_are_what_both_sides_count_on() {
             batches as "batches", near_light as "near_light", lamp as "lamp", light_index as "light_index",
             light_count as "light_count", dipole as "dipole", near_by_cosine as "near_by_cosine"),
     );
-    for (program, entry) in
-        [(surface::program(false), "gather"), (samples_program(false), "light_samples")]
-    {
+    for (program, entry) in [(surface::program(false), "gather"), (samples_program(false), "light_samples")] {
         assert_layout(
             &program,
             entry,
