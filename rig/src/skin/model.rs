@@ -231,7 +231,9 @@ mod tests {
         for model in ProfileModel::ALL {
             let profile = model.profile("skin1", &media, Some(&table), 0).unwrap();
             let [r, g, b] = profile.total();
-            assert!(r > g && g > b && b > 0.0 && r < 0.6, "{model}");
+            // The directional dipole returns up to more than twice what a walk does.
+            let most = if model == ProfileModel::DirectionalDipole { 0.9 } else { 0.6 };
+            assert!(r > g && g > b && b > 0.0 && r < most, "{model}: {r} {g} {b}");
             let again: Profile = serde_json::from_str(&serde_json::to_string(&profile).unwrap()).unwrap();
             for c in 0..3 {
                 let (a, b) = (profile.cdf(0.7)[c], again.cdf(0.7)[c]);

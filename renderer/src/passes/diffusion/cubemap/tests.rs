@@ -125,8 +125,7 @@ fn texels_of_a_ball(cube: &Cube, radius: f64) -> Vec<[u32; 4]> {
 fn disks_are_those_of_the_equations() {
     use crate::testing::{gpu, read_image, recorded};
     let Some(gpu) = gpu() else { return };
-    let skin2 = |name: &str| name.parse::<crate::settings::DiffusionProfile>().unwrap().shared().clone();
-    let profiles = [skin2("deon-six"), skin2("skin2-better-dipole"), skin2("skin2-directional-dipole")];
+    let profiles = ["deon-six", "skin2-better-dipole", "skin2-directional-dipole"].map(named);
     for profile in &profiles {
         let tables = Tables::new(profile, 2.0).unwrap();
         let samples = tables.samples(12, 0.5);
@@ -366,8 +365,7 @@ impl Stage {
     fn draw_with(&mut self, scatter: ScatterMethod, fixes: Fixes) -> Vec<[f32; 4]> {
         self.draw(scatter);
         let ScatterMethod::DipoleCubemap(samples) = scatter else { panic!("{scatter} has no fixes") };
-        let method =
-            DipoleCubemap::new(self.renderer.gpu(), Rasteriser::Hardware, &self.profile, samples).unwrap();
+        let method = DipoleCubemap::new(self.renderer.gpu(), Rasteriser::Hardware, &self.profile, samples).unwrap();
         *self.renderer.diffusion() = Some(Box::new(method.with_fixes(fixes)));
         let drawn = self.draw(scatter);
         self.renderer.diffusion().take();
@@ -404,51 +402,86 @@ fn error(found: &[[f32; 4]], expected: &[[f32; 4]]) -> (f64, f64) {
 
 const CUBEMAP: ScatterMethod = ScatterMethod::DipoleCubemap(32);
 
+/// Errors to the integral over the surface with 8, 32 and 128 samples, and without scattering.
+fn errors(stage: &mut Stage) -> [f64; 4] {
+    let truth = stage.draw(ScatterMethod::ReferenceSurface(6));
+    let mut to_truth = |scatter| error(&stage.draw(scatter), &truth).0;
+    let cubemap = [8, 32, 128].map(|n| to_truth(ScatterMethod::DipoleCubemap(n)));
+    [cubemap[0], cubemap[1], cubemap[2], to_truth(ScatterMethod::None)]
+}
+
 #[test]
-fn probe_errors() {
-    let shapes: [(&str, Head, Vec3, f32); 3] = [
-        ("sphere side", sphere(15.0), Vec3::new(-1.0, 0.0, -0.2), 36.0),
-        ("waves", waves(1.5), Vec3::new(-1.0, 0.0, -0.6), 50.0),
-        ("lamella", lamella(20.0, 3.0), Vec3::new(0.2, 0.0, 1.0), 50.0),
-    ];
-    for (name, head, direction, across) in shapes {
-        let Some(mut stage) = Stage::new(head, vec![sun(direction)], across, 48) else { return };
-        let truth = stage.draw(ScatterMethod::ReferenceSurface(6));
-        for n in [8, 32, 128] {
-            let found = stage.draw(ScatterMethod::DipoleCubemap(n));
-            eprintln!("{name} {n}: {:?}", error(&found, &truth));
-            if n == 128 {
-                for row in [24, 34] {
-                    let line = |p: &[[f32; 4]], c: usize| -> Vec<String> {
-                        (0..48).step_by(2).map(|x| format!("{:.3}", p[row * 48 + x][c])).collect()
-                    };
-                    for c in [0, 1] {
-                        eprintln!(
-                            "  found {}\n  truth {}",
-                            line(&found, c).join(" "),
-                            line(&truth, c).join(" ")
-                        );
-                    }
-                }
-            }
-        }
-        for (what, fixes) in [
-            ("no lamp shrink", Fixes { shrinks_to_lamp: false, ..Fixes::ALL }),
-            ("no axis shrink", Fixes { shrinks_to_axis: false, ..Fixes::ALL }),
-            ("no bias", Fixes { has_bias: false, ..Fixes::ALL }),
-            ("no facing", Fixes { weighs_by_facing: false, ..Fixes::ALL }),
-            (
-                "none",
-                Fixes {
-                    weighs_by_facing: false,
-                    has_bias: false,
-                    shrinks_to_axis: false,
-                    shrinks_to_lamp: false,
-                },
-            ),
-        ] {
-            eprintln!("  {what}: {:?}", error(&stage.draw_with(CUBEMAP, fixes), &truth));
-        }
+fn a_sphere_converges_to_the_integral_over_its_surface() {
+    let lamp = sun(Vec3::new(-1.0, 0.0, -0.2));
+    let Some(mut stage) = Stage::new(sphere(5.0), vec![lamp], 12.0, 48) else { return };
+    let [few, some, many, none] = errors(&mut stage);
+    assert!(many < some && some < few && many < 0.4 * none, "{few} {some} {many}, none {none}");
+    stage.profile = named("skin2-directional-dipole");
+    let [few, some, many, none] = errors(&mut stage);
+    assert!(many < some && some < few && many < 0.5 * none, "{few} {some} {many}, none {none}");
+}
+
+#[test]
+fn a_plane_with_waves_converges() {
+    let lamp = sun(Vec3::new(-1.0, 0.0, -0.6));
+    let Some(mut stage) = Stage::new(waves(1.5), vec![lamp], 50.0, 48) else { return };
+    let [few, some, many, none] = errors(&mut stage);
+    assert!(
+        many < some && some < few && many < 0.034 && many < 0.5 * none,
+        "{few} {some} {many}, none {none}"
+    );
+}
+
+#[test]
+fn light_through_a_lamella_converges_and_needs_the_fixes() {
+    // Lit from behind: all light comes through 3 mm of skin. Figure 4.6 of the thesis shows the same defects.
+    let lamp = sun(Vec3::new(0.2, 0.0, 1.0));
+    let Some(mut stage) = Stage::new(lamella(20.0, 3.0), vec![lamp], 50.0, 48) else { return };
+    let [few, some, many, none] = errors(&mut stage);
+    assert!(many < some && some < few && many < 0.08, "{few} {some} {many}");
+    assert!(none > 0.9, "without scattering it is dark: {none}");
+    let truth = stage.draw(ScatterMethod::ReferenceSurface(6));
+    let mut without = |fixes| error(&stage.draw_with(CUBEMAP, fixes), &truth).0;
+    let bare = without(Fixes { has_bias: false, ..Fixes::ALL });
+    let unshrunk = without(Fixes { shrinks_to_axis: false, ..Fixes::ALL });
+    let unweighted = without(Fixes { weighs_by_facing: false, ..Fixes::ALL });
+    // Acne: half of the texels lose to their own surface.
+    assert!(bare > 3.0 * some, "{bare} {some}");
+    // A halo along rims.
+    assert!(unshrunk > 1.02 * some, "{unshrunk} {some}");
+    // Steps where an axis begins to show the surface.
+    assert!(unweighted > 1.05 * some, "{unweighted} {some}");
+}
+
+fn named(profile: &str) -> Profile {
+    (**profile.parse::<crate::settings::DiffusionProfile>().unwrap().shared()).clone()
+}
+
+#[test]
+fn forward_scattering_goes_through_every_method() {
+    // A photon walk with g = 0.8 in the unreduced medium of skin1, as `rubor profile --anisotropy` makes it.
+    let table = rubor_rig::skin::monte_carlo::AlbedoTable::build(0.8, 1.4, 2000, 1).unwrap();
+    let [scattering, absorption] = rubor_rig::skin::medium::SKIN1;
+    let walked = |g: f64, table: &rubor_rig::skin::monte_carlo::AlbedoTable| {
+        [0, 1, 2].map(|c| {
+            let profile = table.profile_of(scattering[c] / (1.0 - g), absorption[c]).unwrap();
+            rubor_rig::skin::profile::RadialProfile::Tabulated(profile)
+        })
+    };
+    let reduced = rubor_rig::skin::monte_carlo::AlbedoTable::build(0.0, 1.4, 2000, 1).unwrap();
+    let lamp = sun(Vec3::new(-1.0, 0.0, -0.3));
+    let Some(mut stage) = Stage::new(sphere(15.0), vec![lamp], 36.0, 24) else { return };
+    for scatter in ScatterMethod::all() {
+        let scatter = match scatter {
+            ScatterMethod::ReferenceSurface(_) => ScatterMethod::ReferenceSurface(1),
+            other => other,
+        };
+        stage.profile = Profile { name: "g 0.8".into(), channels: walked(0.8, &table) };
+        let forward = stage.draw(scatter);
+        stage.profile = Profile { name: "g 0".into(), channels: walked(0.0, &reduced) };
+        let difference = error(&forward, &stage.draw(scatter)).0;
+        let is_scattering = scatter != ScatterMethod::None;
+        assert_eq!(difference > 1e-3, is_scattering, "{scatter}: {difference}");
     }
 }
 
@@ -465,9 +498,8 @@ fn even_light_stays_even_and_slanted_light_follows_the_dipole() {
     let cosine = 0.3f32;
     let direction = Vec3::new(-(1.0 - cosine * cosine).sqrt(), 0.0, -cosine);
     for name in ["deon-six", "skin2-directional-dipole"] {
-        let Some(mut stage) = Stage::new(waves(0.0), vec![sun(direction)], 30.0, 48) else { return };
-        stage.profile =
-            (*name.parse::<crate::settings::DiffusionProfile>().unwrap().shared()).as_ref().clone();
+        let Some(mut stage) = Stage::new(waves(0.0), vec![sun(direction)], 24.0, 16) else { return };
+        stage.profile = named(name);
         let unscattered = middle(&stage.draw(ScatterMethod::None));
         let ratio = |p: &[[f32; 4]], c: usize| {
             let sum = |p: &[[f32; 4]]| p.iter().map(|v| f64::from(v[c])).sum::<f64>();
@@ -480,12 +512,12 @@ fn even_light_stays_even_and_slanted_light_follows_the_dipole() {
             }
             None => 1.0,
         });
-        for scatter in [CUBEMAP, ScatterMethod::ReferenceSurface(12)] {
+        for scatter in [CUBEMAP, ScatterMethod::ReferenceSurface(2)] {
             let found = middle(&stage.draw(scatter));
             for c in 0..3 {
                 let r = ratio(&found, c);
                 assert!(
-                    (r / expected[c] - 1.0).abs() < 0.01,
+                    (r / expected[c] - 1.0).abs() < 0.015,
                     "{name}, {scatter}, channel {c}: {r} {}",
                     expected[c]
                 );
