@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use glam::Vec2;
+use rubor_assets::convert::own_color;
 use rubor_assets::export::gltf::{Options, to_bytes};
 use rubor_assets::import::gltf::{ImportedHead, from_bytes};
-use rubor_assets::convert::own_color;
 use rubor_rig::authored::{AlphaMode, Wrap};
 use rubor_rig::color::srgb_encode;
 use rubor_rig::head::Material;
@@ -205,7 +205,8 @@ fn textured_skin_keeps_its_colour_in_own_files() {
     // Other viewers show that very picture: the document holds it once.
     let document = gltf::Gltf::from_slice(&bytes).unwrap();
     let material = document.materials().next().unwrap();
-    let shown = material.pbr_metallic_roughness().base_color_texture().unwrap().texture().source().unwrap().index();
+    let shown =
+        material.pbr_metallic_roughness().base_color_texture().unwrap().texture().source().unwrap().index();
     let extension = document.document.into_json().extensions.unwrap();
     let text = serde_json::to_value(extension).unwrap();
     assert_eq!(text["RUBOR_facial_appearance"]["maps"]["albedo"]["image"], json!(shown));

@@ -364,7 +364,10 @@ fn an_albedo_texture_becomes_chromophores_of_a_head() {
     for (file, into) in [(&linear, &bare), (&encoded, &with_blush)] {
         let out = folder.path("out.glb");
         let report = done(&["chromophores", file, "--into", into, "-o", &out]);
-        assert_eq!((&report["out_of_gamut_texels"], report["exposure"]["gain"].as_f64()), (&0.into(), Some(1.0)));
+        assert_eq!(
+            (&report["out_of_gamut_texels"], report["exposure"]["gain"].as_f64()),
+            (&0.into(), Some(1.0))
+        );
         let found = read(&out);
         let own = found.maps.albedo.as_ref().expect("the colour stays");
         let expected = skin.color(0.05, 0.012);

@@ -10,9 +10,7 @@ use rubor_assets::convert::skin_texels::SkinTexels;
 use rubor_assets::image_io::load_image;
 use rubor_renderer::channels::{CHANNELS, Channel};
 use rubor_renderer::settings::{AntialiasMethod, Output, Quality, Settings};
-use rubor_renderer::{
-    Camera, ColorTable, EnvironmentMap, HeadInstance, HeadOnGpu, Renderer, Scene, native,
-};
+use rubor_renderer::{Camera, ColorTable, EnvironmentMap, HeadInstance, HeadOnGpu, Renderer, Scene, native};
 use rubor_rig::authored::{AuthoredImage, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap};
 use rubor_rig::color::{ciede2000, lab_from_rec709};
 use rubor_rig::face_state::FaceState;
@@ -146,7 +144,9 @@ fn a_scan_keeps_the_colour_of_its_map() {
         };
         let (in_albedo, in_light) =
             (difference(mean(&albedo), mean(&map)), difference(mean(&radiance), mean(&map)));
-        println!("{name}: CIEDE2000 {in_albedo:.2} of the colour, {in_light:.2} under an even sky with reflections");
+        println!(
+            "{name}: CIEDE2000 {in_albedo:.2} of the colour, {in_light:.2} under an even sky with reflections"
+        );
         assert!(in_albedo < 2.0, "{name}: {in_albedo}");
     }
 }

@@ -244,7 +244,12 @@ fn is_saturated(fit: &ChromophoreFit) -> bool {
 }
 
 /// Fits of the colours of a picture. Pictures have few colours for their texels, so each is fitted once.
-fn fits(albedo_linear: &Map, mask: &Mask, exposure: &Exposure, inverse: &SkinInverse<'_>) -> Vec<ChromophoreFit> {
+fn fits(
+    albedo_linear: &Map,
+    mask: &Mask,
+    exposure: &Exposure,
+    inverse: &SkinInverse<'_>,
+) -> Vec<ChromophoreFit> {
     let key = |c: &[f32]| [c[0], c[1], c[2]].map(f32::to_bits);
     let texels = || albedo_linear.values.par_chunks_exact(3).zip(&mask.mapped).with_min_len(4096);
     let mut colors: Vec<[u32; 3]> = texels().filter(|(_, m)| **m).map(|(c, _)| key(c)).collect();
@@ -394,7 +399,8 @@ pub fn no_larger(map: Map, side: u32) -> Map {
     if most <= side {
         return map;
     }
-    let size = [map.width, map.height].map(|n| (u64::from(n) * u64::from(side) / u64::from(most)).max(1) as u32);
+    let size =
+        [map.width, map.height].map(|n| (u64::from(n) * u64::from(side) / u64::from(most)).max(1) as u32);
     resize_area(&map, &Mask::full(map.width, map.height), size[0], size[1]).0
 }
 

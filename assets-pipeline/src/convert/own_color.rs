@@ -89,7 +89,8 @@ pub fn adopt(head: &mut Head, options: &Options) -> Result<Vec<Note>, ConvertErr
         for sheet in &sheets {
             let material = sheet.material(head);
             if material.base_color[..3] != [1.0; 3] {
-                let message = "skin without a texture does not keep its plain colour: it gets that of the maps";
+                let message =
+                    "skin without a texture does not keep its plain colour: it gets that of the maps";
                 notes.add(message, material.name.as_str());
             }
         }
@@ -98,7 +99,9 @@ pub fn adopt(head: &mut Head, options: &Options) -> Result<Vec<Note>, ConvertErr
     if sheets.len() > MAX_SHEETS {
         sheets.sort_by_key(|s| std::cmp::Reverse(s.triangles));
         for sheet in sheets.split_off(MAX_SHEETS) {
-            let message = format!("skin of more than {MAX_SHEETS} materials: the smallest keep the look of their author");
+            let message = format!(
+                "skin of more than {MAX_SHEETS} materials: the smallest keep the look of their author"
+            );
             notes.add(message, sheet.material(head).name.as_str());
             sheet.parts.iter().for_each(|p| head.mesh.parts[*p].material = Material::Other);
         }
@@ -156,7 +159,9 @@ fn sheets(head: &mut Head, options: &Options, notes: &mut Notes) -> Vec<Sheet> {
         let authored = &head.authored.materials[material as usize];
         let is_textured = authored.base_color_texture.is_some();
         let refused = if is_textured && authored.is_unlit && !options.insisted.contains(&index) {
-            Some("skin that is drawn without light keeps the look of its author (`rubor import --parts NAME=skin` lights it)")
+            Some(
+                "skin that is drawn without light keeps the look of its author (`rubor import --parts NAME=skin` lights it)",
+            )
         } else if is_textured && shifts(head, part.triangles.clone(), authored).is_none() {
             Some("skin whose texture repeats across it keeps the look of its author")
         } else {
@@ -207,9 +212,7 @@ fn shifts(
         );
         for (vertex, uv) in triangle.iter().zip(corners) {
             let inside = uv - shift;
-            let is_outside = |x: f32, wrap: Wrap| {
-                wrap != Wrap::Clamp && !(-SLACK..=1.0 + SLACK).contains(&x)
-            };
+            let is_outside = |x: f32, wrap: Wrap| wrap != Wrap::Clamp && !(-SLACK..=1.0 + SLACK).contains(&x);
             let known = *shifts.entry(*vertex).or_insert(shift);
             if known != shift || is_outside(inside.x, wrap[0]) || is_outside(inside.y, wrap[1]) {
                 return None;
@@ -230,7 +233,10 @@ fn say_what_is_left_out(head: &Head, sheets: &[Sheet], notes: &mut Notes) {
             notes.add("skin sends out no light: the emission of its material is left out", name);
         }
         if material.occlusion_texture.is_some() {
-            notes.add("occlusion maps of skin are left out: rubor computes the occlusion of the geometry", name);
+            notes.add(
+                "occlusion maps of skin are left out: rubor computes the occlusion of the geometry",
+                name,
+            );
         }
         if material.clearcoat > 0.0 {
             notes.add("skin has no coat: the clear coat of its material is left out", name);
@@ -380,8 +386,11 @@ impl Atlas {
     fn move_vertices(&self, head: &mut Head, sheets: &[Sheet]) {
         let mut owner: Vec<Option<usize>> = vec![None; head.mesh.vertices.len()];
         let mut is_shared = vec![false; head.mesh.vertices.len()];
-        let sheet_of: HashMap<usize, usize> =
-            sheets.iter().enumerate().flat_map(|(s, sheet)| sheet.parts.iter().map(move |p| (*p, s))).collect();
+        let sheet_of: HashMap<usize, usize> = sheets
+            .iter()
+            .enumerate()
+            .flat_map(|(s, sheet)| sheet.parts.iter().map(move |p| (*p, s)))
+            .collect();
         for (index, part) in head.mesh.parts.iter().enumerate() {
             // Parts that are no skin own their vertices as a sheet of their own does.
             let id = sheet_of.get(&index).copied().unwrap_or(usize::MAX);
@@ -410,7 +419,9 @@ impl Atlas {
                             continue;
                         }
                         let uv = match material.base_color_texture {
-                            Some(_) => base_uv(head, &material, v) - shifts.get(&v).copied().unwrap_or_default(),
+                            Some(_) => {
+                                base_uv(head, &material, v) - shifts.get(&v).copied().unwrap_or_default()
+                            }
                             // One colour: the middle of its sheet.
                             None => Vec2::splat(0.5),
                         };
@@ -429,8 +440,7 @@ impl Atlas {
     /// From a sheet into the unit square.
     fn place(&self, sheet: usize) -> Affine2 {
         let side = 1.0 / self.across as f32;
-        Affine2::from_scale(Vec2::splat(side))
-            * Affine2::from_translation(self.layout[sheet].as_vec2())
+        Affine2::from_scale(Vec2::splat(side)) * Affine2::from_translation(self.layout[sheet].as_vec2())
     }
 }
 
@@ -476,21 +486,22 @@ fn with_vertex_colors(head: &Head, mut albedo: Map, sheets: &[Sheet]) -> Map {
 fn keep_holes(head: &mut Head, sheets: &[Sheet], atlas: &Atlas) {
     for (s, sheet) in sheets.iter().enumerate() {
         let material = sheet.material(head);
-        let kept = material.cutoff().filter(|cutoff| has_holes(head, sheet, *cutoff, atlas, s)).map(|cutoff| {
-            let mut kept = material.clone();
-            kept.alpha = AlphaMode::Mask { cutoff };
-            let base = material.base_color_texture;
-            let moved = |texture: Option<AuthoredTexture>| {
-                let texture = texture.filter(|t| base.is_some_and(|b| is_placed_alike(&b, t)))?;
-                Some(AuthoredTexture { uv_set: 0, transform: back(atlas, s), ..texture })
-            };
-            kept.base_color_texture = moved(kept.base_color_texture);
-            kept.metallic_roughness_texture = moved(kept.metallic_roughness_texture);
-            kept.normal_texture = moved(kept.normal_texture);
-            kept.occlusion_texture = moved(kept.occlusion_texture);
-            kept.emission_texture = moved(kept.emission_texture);
-            kept
-        });
+        let kept =
+            material.cutoff().filter(|cutoff| has_holes(head, sheet, *cutoff, atlas, s)).map(|cutoff| {
+                let mut kept = material.clone();
+                kept.alpha = AlphaMode::Mask { cutoff };
+                let base = material.base_color_texture;
+                let moved = |texture: Option<AuthoredTexture>| {
+                    let texture = texture.filter(|t| base.is_some_and(|b| is_placed_alike(&b, t)))?;
+                    Some(AuthoredTexture { uv_set: 0, transform: back(atlas, s), ..texture })
+                };
+                kept.base_color_texture = moved(kept.base_color_texture);
+                kept.metallic_roughness_texture = moved(kept.metallic_roughness_texture);
+                kept.normal_texture = moved(kept.normal_texture);
+                kept.occlusion_texture = moved(kept.occlusion_texture);
+                kept.emission_texture = moved(kept.emission_texture);
+                kept
+            });
         let index = kept.map(|kept| {
             head.authored.materials.push(kept);
             head.authored.materials.len() as u32 - 1

@@ -121,11 +121,7 @@ pub(crate) fn encode_map(what: &str, map: &Map, encoding: MapEncoding) -> Result
 }
 
 /// Encodes a map of linear Rec. 709 colours from 0 to 1 in 8 bits of sRGB.
-pub(crate) fn encode_colors(
-    what: &str,
-    map: &Map,
-    encoding: MapEncoding,
-) -> Result<EncodedMap, ExportError> {
+pub(crate) fn encode_colors(what: &str, map: &Map, encoding: MapEncoding) -> Result<EncodedMap, ExportError> {
     let texels: Vec<u8> =
         map.values.iter().map(|v| (srgb_encode(v.clamp(0.0, 1.0)) * 255.0).round() as u8).collect();
     let (width, height) = (map.width, map.height);
@@ -137,7 +133,13 @@ pub(crate) fn encode_colors(
             (encode_jpeg(what, &texels, width, height, ExtendedColorType::Rgb8, quality)?, "image/jpeg")
         }
     };
-    Ok(EncodedMap { bytes, mime_type, layout: ChannelLayout::Color, offset: vec![0.0; 3], scale: vec![1.0; 3] })
+    Ok(EncodedMap {
+        bytes,
+        mime_type,
+        layout: ChannelLayout::Color,
+        offset: vec![0.0; 3],
+        scale: vec![1.0; 3],
+    })
 }
 
 fn range(map: &Map, channel: usize) -> (f32, f32) {

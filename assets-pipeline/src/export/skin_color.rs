@@ -58,9 +58,12 @@ pub fn bake(head: &Head, face: Option<&FaceState>, side: u32, factor: f32) -> Op
                 let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
                 let (m, h) = (melanin.sample(u, v, 0), hemoglobin.sample(u, v, 0));
                 let skin = match own {
-                    Some(own) => {
-                        lookup.with_blood([0, 1, 2].map(|c| own.sample(u, v, c)), m, neutral.sample(u, v, 0), h)
-                    }
+                    Some(own) => lookup.with_blood(
+                        [0, 1, 2].map(|c| own.sample(u, v, c)),
+                        m,
+                        neutral.sample(u, v, 0),
+                        h,
+                    ),
                     None => lookup.sample(m, h),
                 };
                 let hair = maps.hair.as_ref().map_or(0.0, |h| h.sample(u, v, 0));

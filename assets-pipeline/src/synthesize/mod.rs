@@ -343,11 +343,7 @@ pub fn synthesize_into(head: &mut Head, options: &Options) -> Result<(), Synthes
 
 /// Gives skin that has a colour by itself what it lacks: distributions, and where landmarks say where the face is wrinkles
 /// and relief. Its own maps stay; no hair is made, as its colour holds it.
-fn complete(
-    head: &mut Head,
-    options: &Options,
-    step: &(dyn Fn() + Sync),
-) -> Result<(), SynthesizeError> {
+fn complete(head: &mut Head, options: &Options, step: &(dyn Fn() + Sync)) -> Result<(), SynthesizeError> {
     options.check()?;
     let own = head.maps.clone();
     let Some(blood) = &own.hemoglobin else { return Ok(()) };

@@ -118,8 +118,13 @@ impl<'a> Frame<'a> {
         passes.cropped_hair.record(r, hair, &seen, &self.heads, &hdr, velocity.as_ref());
         let ambient = average_light(self.scene);
         passes.overlay.record(r, hair, ambient, &seen, &self.heads, &hdr, velocity.as_ref());
-        let lighting =
-            Lighting { light, seen: &seen, first: None, transmittance: None, quality: &self.settings.quality };
+        let lighting = Lighting {
+            light,
+            seen: &seen,
+            first: None,
+            transmittance: None,
+            quality: &self.settings.quality,
+        };
         let hdr = passes.see_through.record(r, &passes.shade, &lighting, &self.heads, hdr);
 
         self.keep([

@@ -66,9 +66,13 @@ pub fn of_maps(maps: &SkinMaps) -> Vec<Footprint> {
         entry("chromophores", largest_of(skin.into_iter().flatten()), 1, true, &COLOR),
         match &maps.albedo {
             // Roughness shares the texture of the slopes.
-            Some(_) => {
-                entry("albedo, specular", largest_of(maps.albedo.iter().chain(&maps.specular)), 1, true, &ALBEDO)
-            }
+            Some(_) => entry(
+                "albedo, specular",
+                largest_of(maps.albedo.iter().chain(&maps.specular)),
+                1,
+                true,
+                &ALBEDO,
+            ),
             None => entry("specular", largest_of(maps.specular.iter()), 1, true, &GLOSS),
         },
         entry("slopes", slope_size(maps), 1, true, &SLOPES),

@@ -296,7 +296,8 @@ fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 4]) {
     let has_holes = |part: usize| {
         let material = head.needed_material(part).map(|m| &head.authored.materials[m as usize]);
         let is_skin = head.authored_material(part).is_none();
-        material.is_some_and(|m| m.cutoff().is_some() || m.is_see_through() || !(m.is_double_sided || is_skin))
+        material
+            .is_some_and(|m| m.cutoff().is_some() || m.is_see_through() || !(m.is_double_sided || is_skin))
     };
     let is_see_through = |part: usize| {
         let material = head.authored_material(part).map(|m| &head.authored.materials[m as usize]);

@@ -287,7 +287,9 @@ pub(crate) fn finish_with(
     } else if lacks_maps(&head) && common.maps > 0 {
         if !synthesize::finds_face(&head) {
             let message = match head.maps.albedo {
-                Some(_) => "no landmarks say where the face is: skin gets no wrinkles, and its blood changes alike everywhere",
+                Some(_) => {
+                    "no landmarks say where the face is: skin gets no wrinkles, and its blood changes alike everywhere"
+                }
                 None => "no landmarks say where the face is: skin gets no hair, brows and wrinkles",
             };
             console::notes(&[Note::new(path.display().to_string(), message)]);

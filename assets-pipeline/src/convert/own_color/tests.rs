@@ -75,15 +75,21 @@ fn neutral_skin_is_its_texture_at_every_texel_whatever_it_shows() {
     for image in [face(51, 27), noise] {
         let (head, _) = adopted(one_sheet(matte(0), vec![image.clone()]));
         let maps = &head.maps;
-        let (albedo, melanin, blood) =
-            (maps.albedo.as_ref().unwrap(), maps.melanin.as_ref().unwrap(), maps.hemoglobin.as_ref().unwrap());
+        let (albedo, melanin, blood) = (
+            maps.albedo.as_ref().unwrap(),
+            maps.melanin.as_ref().unwrap(),
+            maps.hemoglobin.as_ref().unwrap(),
+        );
         let lookup = SkinModel::new(&ChromophoreModel::default()).bake(64, 64);
         for (i, texel) in image.rgba.chunks_exact(4).enumerate() {
             let own = [0, 1, 2].map(|c| albedo.values[3 * i + c]);
             let (m, h) = (melanin.values[i], blood.values[i]);
             let shown = lookup.with_blood(own, m, h, h).map(rubor_rig::color::srgb_encode);
             for c in 0..3 {
-                assert!((shown[c] * 255.0 - f32::from(texel[c])).abs() < 0.01, "texel {i}: {shown:?} {texel:?}");
+                assert!(
+                    (shown[c] * 255.0 - f32::from(texel[c])).abs() < 0.01,
+                    "texel {i}: {shown:?} {texel:?}"
+                );
             }
             // Whatever it is, its blood is that of skin, and a blush moves it by no more than that of skin.
             assert!((0.0..=0.16).contains(&h) && (0.0..=0.5).contains(&m), "texel {i}: {m} {h}");
@@ -135,7 +141,8 @@ fn several_materials_share_the_unit_square() {
             let expected = color_map(image);
             let new = place(&head);
             assert!((0.0..=1.0).contains(&new.x) && (0.0..=1.0).contains(&new.y), "{new}");
-            let (found, expected) = (albedo.sample(new.x, new.y, 0), factor * expected.sample(old.x, old.y, 0));
+            let (found, expected) =
+                (albedo.sample(new.x, new.y, 0), factor * expected.sample(old.x, old.y, 0));
             assert!((found - expected).abs() < 1e-4, "triangle {t}: {found} for {expected}");
         }
     }
@@ -194,7 +201,10 @@ fn masks_of_skin_keep_their_holes_in_the_atlas() {
     let texture = material.base_color_texture.unwrap();
     let corners = head.mesh.triangles[0].map(|v| head.mesh.vertices[v as usize].uv);
     let back = corners.map(|uv| texture.transform.matrix().transform_point2(uv));
-    assert!(back.iter().zip([Vec2::ZERO, Vec2::X, Vec2::ONE]).all(|(a, b)| a.abs_diff_eq(b, 1e-6)), "{back:?}");
+    assert!(
+        back.iter().zip([Vec2::ZERO, Vec2::X, Vec2::ONE]).all(|(a, b)| a.abs_diff_eq(b, 1e-6)),
+        "{back:?}"
+    );
 }
 
 #[test]
@@ -218,7 +228,11 @@ fn normal_map_and_roughness_come_along_and_the_rest_is_said() {
     };
     let (head, notes) = adopted(one_sheet(material, vec![face(16, 16), bumps, gloss]));
     let slopes = head.maps.slopes.unwrap();
-    assert!((slopes.values[0] - 1.0).abs() < 0.03 && slopes.values[1].abs() < 0.03, "{:?}", &slopes.values[..2]);
+    assert!(
+        (slopes.values[0] - 1.0).abs() < 0.03 && slopes.values[1].abs() < 0.03,
+        "{:?}",
+        &slopes.values[..2]
+    );
     let specular = head.maps.specular.unwrap();
     let [intensity, roughness] = [specular.values[0], specular.values[1]];
     assert!((intensity - 0.5).abs() < 1e-3, "{intensity}");
@@ -234,7 +248,8 @@ fn normal_map_and_roughness_come_along_and_the_rest_is_said() {
 #[test]
 fn colours_of_vertices_are_factors() {
     let mut head = one_sheet(matte(0), vec![picture(16, 16, |_| [255; 4])]);
-    head.authored.colors_linear = vec![[0.2, 0.4, 0.6, 1.0], [0.6, 0.4, 0.6, 1.0], [0.6, 0.4, 0.6, 1.0], [0.2, 0.4, 0.6, 1.0]];
+    head.authored.colors_linear =
+        vec![[0.2, 0.4, 0.6, 1.0], [0.6, 0.4, 0.6, 1.0], [0.6, 0.4, 0.6, 1.0], [0.2, 0.4, 0.6, 1.0]];
     let (head, _) = adopted(head);
     let albedo = head.maps.albedo.unwrap();
     for (u, red) in [(0.25, 0.3), (0.5, 0.4), (0.75, 0.5)] {

@@ -14,9 +14,9 @@ use super::maps::write_albedo;
 use crate::error::ExportError;
 use crate::export::TextureFormat;
 use crate::export::image_codec::encode_picture;
+use crate::export::pictures::{Picture, Pictures, appearance};
 use crate::export::skin_color::has_skin_color;
 use crate::facial_appearance::MapEntry;
-use crate::export::pictures::{Picture, Pictures, appearance};
 
 /// glTF extension of WebP pictures.
 const WEBP: &str = "EXT_texture_webp";

@@ -122,7 +122,10 @@ impl<'a> Materials<'a> {
                 "specular colour",
             ),
             clearcoat,
-            clearcoat_texture: texture(extension("KHR_materials_clearcoat", "clearcoatTexture"), "clear coat"),
+            clearcoat_texture: texture(
+                extension("KHR_materials_clearcoat", "clearcoatTexture"),
+                "clear coat",
+            ),
             clearcoat_roughness,
             clearcoat_roughness_texture: texture(
                 extension("KHR_materials_clearcoat", "clearcoatRoughnessTexture"),

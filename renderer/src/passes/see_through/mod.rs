@@ -24,8 +24,8 @@ use std::sync::OnceLock;
 
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{
-    Attachments, Bind, Draw, Gpu, Image, ImageSpec, Kernel, Raster, RasterKernel, Recorder,
-    color_attachment, depth_attachment,
+    Attachments, Bind, Draw, Gpu, Image, ImageSpec, Kernel, Raster, RasterKernel, Recorder, color_attachment,
+    depth_attachment,
 };
 use crate::passes::pixel_groups;
 use crate::passes::shade::{Lighting, Shade};
@@ -133,8 +133,7 @@ fn find(
     let depth = r.image("layer depth", ImageSpec::attachment(size, wgpu::TextureFormat::Depth32Float));
     let drawn: Vec<_> = heads.iter().filter(|h| h.head.see_through_triangles > 0).collect();
     let first = |h: &PosedHead<'_>| h.head.opaque_triangles - h.head.see_through_triangles;
-    let numbers: Vec<_> =
-        drawn.iter().map(|h| r.uniform("layer", &[h.index, first(h), layer, 0])).collect();
+    let numbers: Vec<_> = drawn.iter().map(|h| r.uniform("layer", &[h.index, first(h), layer, 0])).collect();
     let each: Vec<_> = (drawn.iter().zip(&numbers))
         .filter_map(|(h, number)| {
             let mut resources = h.head.cut_resources()?;

@@ -81,7 +81,9 @@ fn a_lamp_on_it_is_the_equation() {
 fn index_strength_and_coat_are_those_of_the_extensions() {
     let Some(mut renderer) = renderer() else { return };
     let base = 0.5f32;
-    for (ior, specular, coat) in [(2.0f32, 1.0f32, [0.0f32, 0.0f32]), (1.5, 0.3, [0.0; 2]), (1.33, 0.8, [0.7, 0.25])] {
+    for (ior, specular, coat) in
+        [(2.0f32, 1.0f32, [0.0f32, 0.0f32]), (1.5, 0.3, [0.0; 2]), (1.33, 0.8, [0.7, 0.25])]
+    {
         let material = AuthoredMaterial {
             base_color: [base, base, base, 1.0],
             metallic: 0.0,
@@ -94,12 +96,8 @@ fn index_strength_and_coat_are_those_of_the_extensions() {
         };
         let head = head(material);
         let under = MetallicRoughness { base: f64::from(base), metallic: 0.0, roughness: 0.5 };
-        let expected = Coated {
-            under,
-            ior: f64::from(ior),
-            specular: f64::from(specular),
-            coat: coat.map(f64::from),
-        };
+        let expected =
+            Coated { under, ior: f64::from(ior), specular: f64::from(specular), coat: coat.map(f64::from) };
         let light = lamp(Vec3::new(-0.5, -0.4, -0.8));
         draw(&mut renderer, &head, &[light], false);
         let (compared, largest) =

@@ -84,8 +84,7 @@ impl Coated {
         let schlick = |f0: f64, f90: f64, cosine: f64| f0 + (f90 - f0) * (1.0 - cosine).powi(5);
         let f0 = self.specular * ((self.ior - 1.0) / (self.ior + 1.0)).powi(2);
         let fresnel = schlick(f0, self.specular, half.dot(to_viewer));
-        let under =
-            cos_light * (1.0 - fresnel) * self.under.base / PI + fresnel * lobe(self.under.roughness);
+        let under = cos_light * (1.0 - fresnel) * self.under.base / PI + fresnel * lobe(self.under.roughness);
         let coat = self.coat[0] * schlick(0.04, 1.0, cos_viewer);
         (1.0 - coat) * under + coat * lobe(self.coat[1])
     }

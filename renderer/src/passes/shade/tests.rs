@@ -1,8 +1,8 @@
 //! Light that spreads in materials that `diffusion` does not scatter.
 
 use glam::{DVec3, Mat4, Vec2, Vec3};
-use rubor_rig::face_state::FaceState;
 use rubor_rig::color::{srgb_decode, srgb_encode};
+use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex};
 use rubor_rig::map::Map;
 use rubor_rig::random::SplitMix64;
