@@ -162,11 +162,11 @@ fn the_exposure_of_a_picture_is_found_and_its_confidence_said() {
     assert_eq!(true_one.gain, 1.0);
     let bright = chromophores::estimate_exposure(&exposed(&lookup, 1.45), &full, &lookup, threshold);
     assert!((1.45 * bright.gain - 1.0).abs() < 0.1 && bright.range[1] < 1.0, "{bright}");
-    // The cast of a warm lamp is found where no gain alone makes it skin.
-    let mut warm = exposed(&lookup, 1.0);
-    warm.values.chunks_exact_mut(3).for_each(|c| c[2] *= 0.8);
-    let warm = chromophores::estimate_exposure(&warm, &full, &lookup, threshold);
-    assert!(warm.balance[2] > 1.1 * warm.balance[0], "{warm}");
+    // The cast of a green lamp is found: no gain alone makes it skin.
+    let mut lit_green = exposed(&lookup, 1.0);
+    lit_green.values.chunks_exact_mut(3).for_each(|c| (c[0], c[1]) = (0.85 * c[0], 1.15 * c[1]));
+    let lit_green = chromophores::estimate_exposure(&lit_green, &full, &lookup, threshold);
+    assert!(lit_green.balance[0] > 1.1 * lit_green.balance[1], "{lit_green}");
     assert_eq!((true_one.balance, bright.balance), ([1.0; 3], [1.0; 3]));
     // A green picture has no exposure at which it is skin.
     let green = Map::filled(24, 24, &[0.1, 0.6, 0.1]);
