@@ -462,12 +462,10 @@ fn gltf_files() {
     cut.truncate(cut.len() - 1);
     t.bytes("a GLB that was cut off", &cut, |_| panic!("it was read"));
     t.bytes("a GLB of version 1", &old, |_| panic!("it was read"));
-    t.refused("a Draco mesh without data", |d, _, _| {
+    t.refused("a Draco mesh without data", |d, p, a| {
         d["meshes"][0]["primitives"][0]["extensions"] =
             json!({"KHR_draco_mesh_compression": {"bufferView": 99, "attributes": {"POSITION": 0}}});
-        d["accessors"].as_array_mut().expect("accessors").iter_mut().for_each(|a| {
-            a.as_object_mut().expect("an accessor").remove("bufferView");
-        });
+        p.accessors[a.position].as_object_mut().expect("an accessor").remove("bufferView");
     });
     t.refused("an unknown extension that the file requires", |d, _, _| {
         d["extensionsRequired"] = json!(["ACME_blobs"])
