@@ -115,7 +115,8 @@ fn logistic(rows: &[(Vec<f64>, bool)]) -> Vec<f32> {
 
 fn read(path: &Path) -> Head {
     if path.is_dir() {
-        let options = import::obj_set::Options { folder: path.into(), occlusion_rays: 0, ..Default::default() };
+        let options =
+            import::obj_set::Options { folder: path.into(), occlusion_rays: 0, ..Default::default() };
         return import::obj_set::import(&options).unwrap();
     }
     import::gltf::from_bytes(&std::fs::read(path).unwrap(), path).unwrap().head

@@ -23,8 +23,21 @@ fn face() -> Head {
 /// Errors of landmarks on the inner face, mm of an adult's: median and largest.
 fn errors(head: &Head, fit: &Fit) -> (f32, f32, String) {
     let inner = [
-        "endocanthion", "exocanthion", "lid-upper", "lid-lower", "alare", "cheilion", "pronasale", "subnasale", "sellion",
-        "labrale-superius", "stomion", "labrale-inferius", "menton", "glabella", "brow-middle",
+        "endocanthion",
+        "exocanthion",
+        "lid-upper",
+        "lid-lower",
+        "alare",
+        "cheilion",
+        "pronasale",
+        "subnasale",
+        "sellion",
+        "labrale-superius",
+        "stomion",
+        "labrale-inferius",
+        "menton",
+        "glabella",
+        "brow-middle",
     ];
     let mut found: Vec<(f32, &String)> = (head.landmarks.iter())
         .filter(|(name, _)| inner.iter().any(|i| name.starts_with(i)))
@@ -74,7 +87,12 @@ fn turned_scaled_and_cut_heads_are_found() {
 #[test]
 fn noise_and_missing_parts_do_not_matter() {
     is_found("noisy", &noisy(face(), 1, 0.8), 3.0, 8.0);
-    is_found("without ears and eyes", &keep(&face(), |m, p| m == Material::Skin && p.x.abs() < 0.068), 3.0, 9.0);
+    is_found(
+        "without ears and eyes",
+        &keep(&face(), |m, p| m == Material::Skin && p.x.abs() < 0.068),
+        3.0,
+        9.0,
+    );
 }
 
 #[test]
@@ -142,9 +160,11 @@ fn pixels_of_the_picture_mean_the_places_that_it_shows() {
     // The mark is the only pure colour of the picture.
     let pixel = |i: usize| [picture.rgb[3 * i], picture.rgb[3 * i + 1], picture.rgb[3 * i + 2]];
     let marked: Vec<usize> = (0..picture.rgb.len() / 3).filter(|i| pixel(*i) == [80, 255, 120]).collect();
-    let mean = |of: &dyn Fn(usize) -> usize| marked.iter().map(|i| of(*i) as f32).sum::<f32>() / marked.len() as f32;
+    let mean =
+        |of: &dyn Fn(usize) -> usize| marked.iter().map(|i| of(*i) as f32).sum::<f32>() / marked.len() as f32;
     let width = picture.width as usize;
-    let text = format!(r#"{{"pronasale": {{"pixel": [{}, {}]}}}}"#, mean(&|i| i % width), mean(&|i| i / width));
+    let text =
+        format!(r#"{{"pronasale": {{"pixel": [{}, {}]}}}}"#, mean(&|i| i % width), mean(&|i| i / width));
     let found = read_given(&text, &head, None).unwrap()["pronasale"];
     assert!(found.distance(head.landmarks["pronasale"]) < 0.002, "{found}");
 }
@@ -190,8 +210,11 @@ fn ict() -> Option<&'static Head> {
         for file in ["generic_neutral_mesh.obj", "jawOpen.obj", "vertex_indices.json"] {
             std::fs::copy(source.join(file), folder.path().join(file)).unwrap();
         }
-        let options =
-            import::obj_set::Options { folder: folder.path().into(), occlusion_rays: 0, ..Default::default() };
+        let options = import::obj_set::Options {
+            folder: folder.path().into(),
+            occlusion_rays: 0,
+            ..Default::default()
+        };
         Some(import::obj_set::import(&options).unwrap())
     });
     HEAD.as_ref()
@@ -216,8 +239,10 @@ fn teeth_and_lashes_of_the_ict_head_are_what_they_are() {
         assert!((v.y - 0.5).abs() < 0.065 && v.x.abs() < 0.56, "no gums on teeth: {v}");
     }
     // Upper and lower rows, left and right.
-    let rows: std::collections::BTreeSet<(bool, bool)> =
-        vertices(Material::Teeth).map(|v| head.mesh.vertices[*v as usize].uv).map(|v| (v.y > 0.5, v.x > 0.0)).collect();
+    let rows: std::collections::BTreeSet<(bool, bool)> = vertices(Material::Teeth)
+        .map(|v| head.mesh.vertices[*v as usize].uv)
+        .map(|v| (v.y > 0.5, v.x > 0.0))
+        .collect();
     assert_eq!(rows.len(), 4);
     // Hairs, not bands.
     assert!(vertices(Material::Lash).all(|v| head.mesh.vertices[*v as usize].uv.x >= 2.0));
@@ -234,7 +259,14 @@ fn the_scan_of_lee_perry_smith_is_found() {
     assert!(fit.confidence > TRUSTED, "{} {:?}", fit.confidence, fit.measures);
     // Picked on a picture of the scan, its units.
     let tip = fit.landmarks["pronasale"];
-    let front = head.mesh.points.iter().copied().filter(|p| p.y.abs() < 1.5).max_by(|a, b| a.z.total_cmp(&b.z)).unwrap();
+    let front = head
+        .mesh
+        .points
+        .iter()
+        .copied()
+        .filter(|p| p.y.abs() < 1.5)
+        .max_by(|a, b| a.z.total_cmp(&b.z))
+        .unwrap();
     assert!(tip.distance(front) < 0.12, "{tip}, not {front}");
     assert!((30.0..70.0).contains(&fit.unit_mm), "a unit is about 50 mm: {}", fit.unit_mm);
     let turned = moved(head, |p| Mat3::from_rotation_y(0.5) * p);

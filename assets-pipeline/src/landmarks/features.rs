@@ -89,7 +89,8 @@ impl<'a> Front<'a> {
         // Counted from the nose outwards.
         let out = |i: &usize| side * window.center(i % window.width, i / window.width).x;
         let up = |i: &usize| window.center(i % window.width, i / window.width).y;
-        let (inner, outer) = pixels.iter().map(out).fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(v), b.max(v)));
+        let (inner, outer) =
+            pixels.iter().map(out).fold((f32::MAX, f32::MIN), |(a, b), v| (a.min(v), b.max(v)));
         if outer - inner < 10.0 || pixels.iter().any(|i| self.triangle(*i).is_none()) {
             // Too narrow for an eye, or a hole without one: its corners are the border of the skin, seen through.
             if outer - inner < 10.0 {
@@ -198,7 +199,9 @@ impl<'a> Front<'a> {
             found
         };
         let (right, left) = (walk(-1), walk(1));
-        let width = |side: &[(usize, f32)]| side.last().map_or(0.0, |(x, _)| (*x as f32 - middle as f32).abs() * PIXEL_MM);
+        let width = |side: &[(usize, f32)]| {
+            side.last().map_or(0.0, |(x, _)| (*x as f32 - middle as f32).abs() * PIXEL_MM)
+        };
         // A mouth is 30 to 80 mm wide, and not all on one side.
         let (w_left, w_right) = (width(&left), width(&right));
         if w_left < 13.0 || w_right < 13.0 || w_left > 41.0 || w_right > 41.0 {
@@ -227,7 +230,8 @@ impl<'a> Front<'a> {
         });
         let front = near.clone().map(|i| self.depth.z[i]).fold(f32::MIN, f32::max);
         // The middle of what is within half a millimetre: tips are flat.
-        let tips: Vec<Vec3> = near.filter(|i| self.depth.z[*i] > front - 0.5).map(|i| self.depth.place(i)).collect();
+        let tips: Vec<Vec3> =
+            near.filter(|i| self.depth.z[*i] > front - 0.5).map(|i| self.depth.place(i)).collect();
         if tips.is_empty() {
             return None;
         }

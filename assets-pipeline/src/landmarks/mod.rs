@@ -92,7 +92,8 @@ const FEWEST_GIVEN: usize = 4;
 /// confidence is 1.
 pub fn find_with(head: &Head, given: &BTreeMap<String, Vec3>) -> Option<Fit> {
     let surface = Surface::of(head, |part| is_seen(head, part));
-    let canonical: BTreeMap<&str, Vec3> = template().landmarks.iter().map(|(n, p)| (n.as_str(), *p)).collect();
+    let canonical: BTreeMap<&str, Vec3> =
+        template().landmarks.iter().map(|(n, p)| (n.as_str(), *p)).collect();
     let known: Vec<(Vec3, Vec3)> =
         given.iter().filter_map(|(name, place)| Some((*place, *canonical.get(name.as_str())?))).collect();
     let weight = 1.0 / known.len().max(1) as f32;
@@ -148,7 +149,8 @@ fn measures(quality: &Quality, score: f32) -> [(&'static str, f32); 7] {
 }
 
 fn confidence(quality: &Quality, score: f32) -> f32 {
-    let sum = MODEL[0] + measures(quality, score).iter().zip(&MODEL[1..]).map(|((_, v), w)| v * w).sum::<f32>();
+    let sum =
+        MODEL[0] + measures(quality, score).iter().zip(&MODEL[1..]).map(|((_, v), w)| v * w).sum::<f32>();
     1.0 / (1.0 + (-sum).exp())
 }
 

@@ -109,8 +109,12 @@ pub fn draw(head: &Head, fit: Option<&Fit>, landmarks: &BTreeMap<String, Vec3>) 
             rgb[at + c] = (255.0 * value.clamp(0.0, 1.0)) as u8;
         }
     }
-    let mut picture =
-        Picture { width: width as u32, height: height as u32, rgb, names: landmarks.keys().cloned().collect() };
+    let mut picture = Picture {
+        width: width as u32,
+        height: height as u32,
+        rgb,
+        names: landmarks.keys().cloned().collect(),
+    };
     let mut labels: Vec<Vec2> = Vec::new();
     for (number, place) in landmarks.values().enumerate() {
         let at = camera.pixel(*place);
@@ -154,7 +158,8 @@ impl Picture {
         for (k, digit) in digits.into_iter().enumerate() {
             for (color, grow) in [([20, 20, 20], 1.0), ([255, 255, 120], 0.0)] {
                 for bit in (0..15).filter(|b| digit >> (14 - b) & 1 == 1) {
-                    let corner = at.round() + SCALE * Vec2::new((bit % 3) as f32 + 4.0 * k as f32, (bit / 3) as f32);
+                    let corner =
+                        at.round() + SCALE * Vec2::new((bit % 3) as f32 + 4.0 * k as f32, (bit / 3) as f32);
                     let mut y = -grow;
                     while y < SCALE + grow {
                         let mut x = -grow;

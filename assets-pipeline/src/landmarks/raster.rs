@@ -216,7 +216,10 @@ mod tests {
     #[test]
     fn relief_is_what_stands_out_of_a_slope() {
         let slope = sheet(|x, y| 0.5 * x + 0.2 * y);
-        assert!(slope.relief(&slope.sums(), 6).iter().all(|r| r.abs() < 1e-3), "a tilted plane is flat up to its border");
+        assert!(
+            slope.relief(&slope.sums(), 6).iter().all(|r| r.abs() < 1e-3),
+            "a tilted plane is flat up to its border"
+        );
         let ridge = sheet(|x, _| 0.3 * (-x * x / 0.01).exp());
         let relief = ridge.relief(&ridge.sums(), 6);
         let at = |x: f32| relief[ridge.window.index(Vec2::new(x, 0.0)).unwrap()];

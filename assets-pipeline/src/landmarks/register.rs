@@ -166,8 +166,7 @@ impl Bend {
 
     pub(super) fn apply(&self, p: Vec3) -> Vec3 {
         let n = self.centers.len();
-        let radial: DVec3 =
-            self.centers.iter().zip(&self.weights).map(|(c, w)| *w * kernel(p - *c)).sum();
+        let radial: DVec3 = self.centers.iter().zip(&self.weights).map(|(c, w)| *w * kernel(p - *c)).sum();
         let linear: DVec3 = linear_terms(p).iter().zip(&self.weights[n..]).map(|(t, w)| *w * *t).sum();
         (radial + linear).as_vec3()
     }

@@ -70,7 +70,8 @@ pub(super) fn candidates(surface: &Surface) -> Vec<Candidate> {
 
 /// The best candidate of each direction and scale.
 fn scan(surface: &Surface, turns: &[Mat3], scales: Scales) -> Vec<Candidate> {
-    let found: Vec<Candidate> = turns.par_iter().flat_map_iter(|turn| scan_view(surface, turn, scales)).collect();
+    let found: Vec<Candidate> =
+        turns.par_iter().flat_map_iter(|turn| scan_view(surface, turn, scales)).collect();
     distinct(found)
 }
 
@@ -97,7 +98,8 @@ fn distinct(mut found: Vec<Candidate>) -> Vec<Candidate> {
 fn probes() -> Vec<(f32, f32, f32)> {
     let relief = &template().relief;
     let inside = |i: &usize| !relief[*i].is_nan();
-    let every_other = |i: &usize| (i % RELIEF_WIDTH).is_multiple_of(2) && (i / RELIEF_WIDTH).is_multiple_of(2);
+    let every_other =
+        |i: &usize| (i % RELIEF_WIDTH).is_multiple_of(2) && (i / RELIEF_WIDTH).is_multiple_of(2);
     (0..relief.len())
         .filter(inside)
         .filter(every_other)
@@ -134,11 +136,8 @@ fn scan_view(surface: &Surface, turn: &Mat3, scales: Scales) -> Vec<Candidate> {
         let left = (middle - reach).max(low.x - 0.6 * reach);
         let right = (middle + reach).min(high.x + 0.6 * reach);
         let margin = Vec2::splat(0.1 * octave[0] * height);
-        let window = Window::covering(
-            Vec2::new(left, low.y) - margin,
-            Vec2::new(right, high.y) + margin,
-            pixel,
-        );
+        let window =
+            Window::covering(Vec2::new(left, low.y) - margin, Vec2::new(right, high.y) + margin, pixel);
         let depth = Depth::draw(window, triangles.iter().copied());
         let sums = depth.sums();
         for part in octave {

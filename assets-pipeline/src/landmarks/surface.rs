@@ -135,11 +135,8 @@ impl Cloud {
         let mut cloud = Self::default();
         for degrees in VIEWS {
             let turn = Mat3::from_rotation_y(-degrees.to_radians());
-            let window = Window::covering(
-                Vec2::new(LOW.x - 20.0, LOW.y),
-                Vec2::new(HIGH.x + 20.0, HIGH.y),
-                pixel_mm,
-            );
+            let window =
+                Window::covering(Vec2::new(LOW.x - 20.0, LOW.y), Vec2::new(HIGH.x + 20.0, HIGH.y), pixel_mm);
             let corners = surface.corners.iter().map(|t| t.map(|p| turn * p));
             let depth = Depth::draw(window, corners);
             let radius = (BUMP_RADIUS_MM / pixel_mm).round() as usize;
@@ -174,9 +171,7 @@ impl Cloud {
     }
 
     pub(super) fn keys(&self) -> Vec<[f32; 7]> {
-        (0..self.places.len())
-            .map(|i| Self::key(self.places[i], self.normals[i], self.bumps[i]))
-            .collect()
+        (0..self.places.len()).map(|i| Self::key(self.places[i], self.normals[i], self.bumps[i])).collect()
     }
 }
 

@@ -93,7 +93,8 @@ impl Template {
         let (marks, relief) = rest.split_at((6 * names.len()).min(rest.len()));
         let i16_at = |b: &[u8], i: usize| i16::from_le_bytes([b[i], b[i + 1]]);
         let place = |b: &[u8]| Vec3::from_array([0, 2, 4].map(|i| f32::from(i16_at(b, i)) * 0.01));
-        let landmarks = names.into_iter().zip(marks.chunks_exact(6)).map(|(name, b)| (name, place(b))).collect();
+        let landmarks =
+            names.into_iter().zip(marks.chunks_exact(6)).map(|(name, b)| (name, place(b))).collect();
         let mut cloud = Cloud::default();
         for p in points.chunks_exact(10) {
             cloud.places.push(place(p));
@@ -150,7 +151,9 @@ pub fn canonical_face(head: &Head) -> Vec<u8> {
     }
     left.retain(|(p, ..)| p.x >= 0.0 && (-125.0..92.0).contains(&p.y) && p.z > -40.0);
     // Thinned out from the nose outwards, which keeps more of what has more shape.
-    left.sort_by(|a, b| a.0.distance(Vec3::new(0.0, -33.0, 110.0)).total_cmp(&b.0.distance(Vec3::new(0.0, -33.0, 110.0))));
+    left.sort_by(|a, b| {
+        a.0.distance(Vec3::new(0.0, -33.0, 110.0)).total_cmp(&b.0.distance(Vec3::new(0.0, -33.0, 110.0)))
+    });
     let mut kept: Vec<(Vec3, Vec3, f32)> = Vec::new();
     for p in left {
         let spacing = if is_inner(p.0) { 4.2 } else { 7.5 };
@@ -182,7 +185,8 @@ pub fn canonical_face(head: &Head) -> Vec<u8> {
             let (here, there) = (at(x, y), at(RELIEF_WIDTH - 1 - x, y));
             let middle = window.center(x + RELIEF_RADIUS, y + RELIEF_RADIUS);
             // An oval from the brows to the chin.
-            let oval = Vec2::new(middle.x / 60.0, (middle.y + 34.0) / if middle.y > -34.0 { 84.0 } else { 72.0 });
+            let oval =
+                Vec2::new(middle.x / 60.0, (middle.y + 34.0) / if middle.y > -34.0 { 84.0 } else { 72.0 });
             if oval.length() > 1.0 || !depth.covers(here) || !depth.covers(there) {
                 return f32::NAN;
             }

@@ -15,7 +15,8 @@ pub(super) fn assign(head: &mut Head, part: usize) {
     let spread = found.iter().map(|c| (c.center(head).x - middle).abs()).fold(0.0, f32::max);
     let two = spread > 0.6 * wide;
     for left in [true, false] {
-        let ball: Vec<_> = found.iter().filter(|c| (!two && left) || (two && (c.center(head).x > middle) == left)).collect();
+        let ball: Vec<_> =
+            found.iter().filter(|c| (!two && left) || (two && (c.center(head).x > middle) == left)).collect();
         let places: Vec<_> = ball.iter().flat_map(|c| c.places(head)).collect();
         if places.len() < 12 {
             continue;

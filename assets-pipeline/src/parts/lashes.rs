@@ -56,11 +56,8 @@ fn cards(head: &mut Head, part: usize) -> Vec<(String, Material, Vec<u32>)> {
         let (from, to) = card.bounds(head);
         let upper = high - low < 0.15 * (to.x - from.x) || centers[i].y > 0.5 * (low + high);
         let is_layer = kept.iter().any(|k| overlap(head, card, &found[*k]) > 0.6);
-        let ends = format!(
-            "{} {}",
-            if left { "left" } else { "right" },
-            if upper { "upper" } else { "lower" }
-        );
+        let ends =
+            format!("{} {}", if left { "left" } else { "right" }, if upper { "upper" } else { "lower" });
         if is_layer {
             pieces.push((format!("{name} layer {ends} {i}"), Material::Hidden, card.triangles.clone()));
         } else {
@@ -92,7 +89,8 @@ fn card_coordinates(head: &Head, card: &Component) -> Option<HashMap<u32, Vec2>>
             uv_of.entry(vertex.point).or_insert(vertex.uv);
         }
     }
-    let (low, high) = uv_of.values().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(a, b), uv| (a.min(*uv), b.max(*uv)));
+    let (low, high) =
+        uv_of.values().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(a, b), uv| (a.min(*uv), b.max(*uv)));
     let extent = high - low;
     if extent.min_element() <= 1e-6 {
         return None;

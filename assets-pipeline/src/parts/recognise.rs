@@ -83,7 +83,9 @@ fn pieces(head: &Head, part: usize, fit: &Fit, notes: &mut Notes) -> Vec<(String
         };
         let name = if is_whole || word.is_empty() { of.name.clone() } else { format!("{} {word}", of.name) };
         if kind != of.material {
-            let message = format!("told by shape and place to be {word} (`rubor import --parts NAME=MATERIAL` says otherwise)");
+            let message = format!(
+                "told by shape and place to be {word} (`rubor import --parts NAME=MATERIAL` says otherwise)"
+            );
             notes.add(&message, name.as_str());
         }
         pieces.push((name, kind, triangles));
@@ -98,7 +100,16 @@ fn kind(head: &Head, component: &Component, fit: &Fit, color: Option<Vec3>) -> O
     // Places in the frame of the face, mm.
     let local = |p: Vec3| frame * p * mm;
     // The face itself: most of what is on its skin is near.
-    let skin = ["pronasale", "menton", "glabella", "subnasale", "cheek-left", "cheek-right", "cheilion-left", "cheilion-right"];
+    let skin = [
+        "pronasale",
+        "menton",
+        "glabella",
+        "subnasale",
+        "cheek-left",
+        "cheek-right",
+        "cheilion-left",
+        "cheilion-right",
+    ];
     let touches = |name: &&&str| {
         let place = at(name).map(local);
         place.is_some_and(|place| component.places(head).any(|p| local(p).distance(place) < FACE_REACH_MM))
@@ -106,7 +117,10 @@ fn kind(head: &Head, component: &Component, fit: &Fit, color: Option<Vec3>) -> O
     if 2 * skin.iter().filter(touches).count() > skin.len() {
         return Some(Material::Skin);
     }
-    let (low, high) = component.places(head).map(local).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+    let (low, high) = component
+        .places(head)
+        .map(local)
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
     let (extent, center) = (high - low, 0.5 * (low + high));
     for left in [true, false] {
         let eye = local(at(&paired("eye", left))?);
@@ -114,14 +128,19 @@ fn kind(head: &Head, component: &Component, fit: &Fit, color: Option<Vec3>) -> O
         let points: Vec<Vec3> = component.places(head).map(local).collect();
         if points.len() >= 12 && (center - eye).truncate().length() < 12.0 {
             let (ball, radius) = fit_sphere(&points);
-            let off = points.iter().map(|p| (p.distance(ball) - radius).powi(2)).sum::<f32>() / points.len() as f32;
+            let off =
+                points.iter().map(|p| (p.distance(ball) - radius).powi(2)).sum::<f32>() / points.len() as f32;
             let round = off.sqrt() < 0.09 * radius && extent.min_element() > 1.1 * radius;
             if (8.0..20.0).contains(&radius) && round && ball.z < lid.z && lid.z - ball.z < 26.0 {
                 return Some(Material::Eye);
             }
         }
         let is_sheet = extent.y < 16.0 && extent.x > 15.0 && extent.x < 55.0 && extent.z < 25.0;
-        if is_sheet && (center - lid).truncate().length() < 12.0 && high.z > lid.z + 1.0 && is_open(head, component) {
+        if is_sheet
+            && (center - lid).truncate().length() < 12.0
+            && high.z > lid.z + 1.0
+            && is_open(head, component)
+        {
             return Some(Material::Lash);
         }
     }
@@ -145,7 +164,9 @@ fn kind(head: &Head, component: &Component, fit: &Fit, color: Option<Vec3>) -> O
     match is_red {
         Some(true) => Some(Material::Gums),
         _ if (is_arch && extent.y < 30.0) || is_tooth => Some(Material::Teeth),
-        None if in_middle * 4 > component.points.len() && extent.x < 60.0 && extent.z > 25.0 => Some(Material::Gums),
+        None if in_middle * 4 > component.points.len() && extent.x < 60.0 && extent.z > 25.0 => {
+            Some(Material::Gums)
+        }
         _ => None,
     }
 }

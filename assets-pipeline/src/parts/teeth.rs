@@ -35,7 +35,8 @@ pub(super) fn assign(head: &mut Head, part: usize) {
         let row: Vec<&Component> = components.iter().filter(|c| of_row(c)).collect();
         let single = row.len() >= SINGLE_TEETH;
         // A mesh that holds both rows is shared out by its points.
-        let mixed: Vec<Component> = if single { Vec::new() } else { halves(head, &components, &lower, is_lower) };
+        let mixed: Vec<Component> =
+            if single { Vec::new() } else { halves(head, &components, &lower, is_lower) };
         let sign = if is_lower { -1.0 } else { 1.0 };
         if single {
             single_teeth(head, &row, &arch, sign);
@@ -93,8 +94,7 @@ fn halves(head: &Head, components: &[Component], lower: &HashSet<u32>, is_lower:
 
 fn single_teeth(head: &mut Head, row: &[&Component], arch: &Arch, sign: f32) {
     let widths = if sign > 0.0 { UPPER } else { LOWER };
-    let mut teeth: Vec<(f32, &Component)> =
-        row.iter().map(|c| (arch.length(c.center(head)), *c)).collect();
+    let mut teeth: Vec<(f32, &Component)> = row.iter().map(|c| (arch.length(c.center(head)), *c)).collect();
     teeth.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
     let mut counted = [0usize; 2];
     let mut placed = Vec::new();
@@ -155,8 +155,7 @@ struct Arch {
 
 impl Arch {
     fn of(places: impl Iterator<Item = Vec3>) -> Option<Self> {
-        let (low, high) =
-            places.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
+        let (low, high) = places.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
         let half_width = 0.5 * (high.x - low.x);
         if half_width.is_nan() || half_width <= 0.0 || high.z <= low.z {
             return None;

@@ -56,7 +56,8 @@ fn single_teeth_lie_within_the_teeth_that_are_painted() {
         assert_eq!(v.uv.x > 0.0, place.x > 0.0 || (place.x.abs() < 0.004 && v.uv.x > 0.0));
         // Not on a seam: the nearest border between teeth is over half a millimetre away.
         let along = 100.0 * v.uv.x.abs();
-        let borders = if upper { [8.5, 15.0, 22.6, 29.7, 36.5, 46.5] } else { [5.2, 10.9, 17.7, 24.7, 31.8, 42.8] };
+        let borders =
+            if upper { [8.5, 15.0, 22.6, 29.7, 36.5, 46.5] } else { [5.2, 10.9, 17.7, 24.7, 31.8, 42.8] };
         assert!(borders.iter().all(|b| (along - b).abs() > 0.5), "{along} mm");
     }
 }
@@ -77,7 +78,10 @@ fn rows_without_a_jaw_are_told_by_their_height_and_bands_are_measured() {
     fit_coordinates(&mut head, false);
     let edge = |v: &Vertex| 100.0 * (v.uv.y - 0.5).abs();
     let heights: Vec<f32> = head.mesh.vertices[..8].iter().map(edge).collect();
-    assert!(heights.iter().any(|h| *h < 0.1) && heights.iter().any(|h| (*h - 16.0).abs() < 0.2), "{heights:?}");
+    assert!(
+        heights.iter().any(|h| *h < 0.1) && heights.iter().any(|h| (*h - 16.0).abs() < 0.2),
+        "{heights:?}"
+    );
 }
 
 /// Lash cards of one eye: `layers` on each other above, one below; `u` of the file runs from tip to root.
@@ -114,7 +118,8 @@ fn lash_cards_of_any_layout_become_hairs_of_one_fringe() {
     let notes = fit_coordinates(&mut head, false);
     head.validate().unwrap();
     assert!(notes.iter().any(|n| n.message.contains("lie on each other")), "{notes:?}");
-    let names: Vec<(&str, Material)> = head.mesh.parts.iter().map(|p| (p.name.as_str(), p.material)).collect();
+    let names: Vec<(&str, Material)> =
+        head.mesh.parts.iter().map(|p| (p.name.as_str(), p.material)).collect();
     assert_eq!(names.iter().filter(|n| n.1 == Material::Hidden).count(), 2, "{names:?}");
     let hairs: Vec<&str> = names.iter().filter(|n| n.1 == Material::Lash).map(|n| n.0).collect();
     assert_eq!(hairs, ["M_EyeLashes left upper", "M_EyeLashes left lower"]);

@@ -3,10 +3,10 @@
 use glam::Vec3;
 use rubor_rig::head::{Head, Material};
 
+use super::Options;
 use super::face_space::{FaceSpace, plan};
 use super::regions::above_hairline;
 use super::strands::BROWS;
-use super::Options;
 use crate::landmarks::kind;
 
 /// Share of the points of a part that lie about a place of hair from which it is that hair.

@@ -154,7 +154,8 @@ fn lash_strands(chart: &Chart, count: usize, upper: bool, sweep: f32) -> Vec<Str
         // Shorter towards the inner corner, whichever end that is, and none at the very ends.
         let ends = (4.0 * u * (1.0 - u)).powf(0.35);
         // Cards stand straight out and are short; real lashes sweep up, or down, by a few millimetres.
-        let curl = sweep * if upper { Vec3::new(0.0, 0.0042, 0.0012) } else { Vec3::new(0.0, -0.0010, 0.0006) };
+        let curl =
+            sweep * if upper { Vec3::new(0.0, 0.0042, 0.0012) } else { Vec3::new(0.0, -0.0010, 0.0006) };
         let knots = [0.0f32, 0.3, 0.62, 1.0].map(|t| {
             let at =
                 Vec2::new((u + lean * t * t).clamp(0.002, 0.998), (length * ends * t).clamp(0.002, 0.998));

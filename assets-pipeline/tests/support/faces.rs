@@ -66,7 +66,8 @@ pub fn another_person(head: Head, seed: u64, amount_mm: f32) -> Head {
     let nose = head.landmarks["pronasale"];
     let bumps: Vec<(Vec3, f32, Vec3, f32)> = (0..14)
         .map(|_| {
-            let center = nose + Vec3::new(0.075 * signed().abs(), -0.02 + 0.1 * signed(), -0.05 + 0.05 * signed());
+            let center =
+                nose + Vec3::new(0.075 * signed().abs(), -0.02 + 0.1 * signed(), -0.05 + 0.05 * signed());
             let push = Vec3::new(signed(), signed(), signed()) * amount_mm * 0.001;
             (center, 0.022 + 0.02 * signed().abs(), push, 1.0 + 0.2 * signed())
         })
@@ -174,7 +175,9 @@ pub fn capsules(list: &[(Vec3, Vec3, f32)]) -> Head {
             all.mesh.points.push(end + frame * *p * *radius);
         }
         let vertex = all.mesh.vertices.len() as u32;
-        all.mesh.vertices.extend(one.mesh.vertices.iter().map(|v| Vertex { point: first + v.point, uv: v.uv }));
+        all.mesh
+            .vertices
+            .extend(one.mesh.vertices.iter().map(|v| Vertex { point: first + v.point, uv: v.uv }));
         all.mesh.triangles.extend(one.mesh.triangles.iter().map(|t| t.map(|v| vertex + v)));
     }
     let triangles = 0..all.mesh.triangles.len() as u32;
@@ -197,7 +200,9 @@ pub fn no_faces() -> Vec<(&'static str, Head)> {
     let v = Vec3::new;
     let hand: Vec<(Vec3, Vec3, f32)> = (0..4)
         .map(|i| (v(-0.03 + 0.02 * i as f32, 0.04, 0.0), v(-0.045 + 0.03 * i as f32, 0.13, 0.01), 0.009))
-        .chain((0..6).map(|i| (v(-0.03 + 0.012 * i as f32, -0.04, 0.0), v(-0.03 + 0.012 * i as f32, 0.04, 0.0), 0.016)))
+        .chain((0..6).map(|i| {
+            (v(-0.03 + 0.012 * i as f32, -0.04, 0.0), v(-0.03 + 0.012 * i as f32, 0.04, 0.0), 0.016)
+        }))
         .chain([(v(0.03, -0.03, 0.0), v(0.075, 0.03, 0.025), 0.012)])
         .collect();
     let teapot: Vec<(Vec3, Vec3, f32)> = [

@@ -275,15 +275,21 @@ fn place_face(head: &mut Head, common: &Common, about: &str) -> Outcome {
     let percent = (100.0 * fit.confidence).floor();
     if fit.confidence >= landmarks::TRUSTED {
         if !is_known {
-            note(format!("a face was found on the surface (confidence {percent} %), landmarks are placed by it"));
+            note(format!(
+                "a face was found on the surface (confidence {percent} %), landmarks are placed by it"
+            ));
         }
         if fit.turned_degrees > MOST_TURNED_DEGREES {
             let angle = fit.turned_degrees.round();
-            note(format!("the face is turned by {angle} degrees from upright and looking along +Z: pictures show it so"));
+            note(format!(
+                "the face is turned by {angle} degrees from upright and looking along +Z: pictures show it so"
+            ));
         }
         let size = fit.size();
         if !(LIKELY_SIZES.0..LIKELY_SIZES.1).contains(&size) {
-            note(format!("the face is {size:.2} times as large as an adult's: scattering and relief are in millimetres"));
+            note(format!(
+                "the face is {size:.2} times as large as an adult's: scattering and relief are in millimetres"
+            ));
         }
         fit.complete(head);
         let is_given = |name: &str| common.parts.iter().any(|(given, _)| given == name);
@@ -291,7 +297,10 @@ fn place_face(head: &mut Head, common: &Common, about: &str) -> Outcome {
             parts::recognise(head, &fit, is_given).iter().map(|n| Note::new(about, n.to_string())).collect();
         console::notes(&said);
         console::notes(
-            &parts::fit_coordinates(head, true).iter().map(|n| Note::new(about, n.to_string())).collect::<Vec<_>>(),
+            &parts::fit_coordinates(head, true)
+                .iter()
+                .map(|n| Note::new(about, n.to_string()))
+                .collect::<Vec<_>>(),
         );
     } else if !is_known {
         note(format!(
