@@ -132,15 +132,12 @@ impl Depth {
             let mean = |sums: &Sums| sums.around(x, y, radius) / count;
             let off = Vec2::new(mean(along_x) as f32 - x as f32, mean(along_y) as f32 - y as f32);
             let slope = |step: usize, at: usize, last: usize| {
-                let (before, after) =
-                    (if at > 0 { i - step } else { i }, if at < last { i + step } else { i });
-                if covered[before] && covered[after] && before != after {
-                    (self.z[after] - self.z[before]) / ((after - before) / step) as f32
-                } else {
-                    0.0
-                }
+                let before = if at > 0 && covered[i - step] { i - step } else { i };
+                let after = if at < last && covered[i + step] { i + step } else { i };
+                let steps = ((after - before) / step).max(1);
+                (self.z[after] - self.z[before]) / steps as f32
             };
-            let tilt = if off.length() > 0.25 {
+            let tilt = if off.length() > 1e-3 {
                 slope(1, x, width - 1) * off.x + slope(width, y, height - 1) * off.y
             } else {
                 0.0

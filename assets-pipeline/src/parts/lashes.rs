@@ -1,6 +1,6 @@
 //! Lash cards of any layout: u along the lid, v from root to tip; then single hairs in their place.
 //!
-//! A card is a mesh that hangs together. Along its own texture coordinates it is long in one direction, the lid's, and
+//! A card is an island of the texture. Along its own texture coordinates it is long in one direction, the lid's, and
 //! its root is the side nearer to the eye. Cards that lie on each other are layers of one fringe: one of them is kept.
 
 use std::collections::{HashMap, HashSet};
@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 use glam::{Vec2, Vec3};
 use rubor_rig::head::{Head, Material};
 
-use super::{Component, components, set_coordinates, split_part};
+use super::{Component, islands, set_coordinates, split_part};
 use crate::notes::Notes;
 use crate::synthesize;
 
@@ -39,7 +39,7 @@ pub(super) fn assign(head: &mut Head, notes: &mut Notes) {
 /// New parts for the cards of a part.
 fn cards(head: &mut Head, part: usize) -> Vec<(String, Material, Vec<u32>)> {
     let name = head.mesh.parts[part].name.clone();
-    let found = components(head, part);
+    let found = islands(head, part);
     if found.len() > MOST_CARDS {
         return Vec::new();
     }

@@ -42,8 +42,17 @@ pub(crate) struct Component {
     pub points: Vec<u32>,
 }
 
-/// Parts of a part that hang together; points at one place count as one.
+/// Pieces of a part that hang together; points at one place count as one.
 pub(crate) fn components(head: &Head, part: usize) -> Vec<Component> {
+    pieces(head, part, true)
+}
+
+/// Pieces of a part that hang together in the texture: layers of cards share their roots.
+pub(crate) fn islands(head: &Head, part: usize) -> Vec<Component> {
+    pieces(head, part, false)
+}
+
+fn pieces(head: &Head, part: usize, by_place: bool) -> Vec<Component> {
     let mesh = &head.mesh;
     let range = mesh.parts[part].triangles.clone();
     let mut at_place: HashMap<IVec3, u32> = HashMap::new();
@@ -58,15 +67,19 @@ pub(crate) fn components(head: &Head, part: usize) -> Vec<Component> {
     }
     // A thousandth of the part's size or finer.
     let points_of = |t: u32| mesh.triangles[t as usize].map(|v| mesh.vertices[v as usize].point);
+    let nodes_of = |t: u32| if by_place { points_of(t) } else { mesh.triangles[t as usize] };
     let places = range.clone().flat_map(points_of).map(|p| mesh.points[p as usize]);
     let (low, high) = places.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
     let cell = ((high - low).max_element() * 2e-5).max(1e-9);
     let mut whole = |p: u32| {
+        if !by_place {
+            return p;
+        }
         let key = ((mesh.points[p as usize] - low) / cell).round().as_ivec3();
         *at_place.entry(key).or_insert(p)
     };
     for t in range.clone() {
-        let points = points_of(t).map(&mut whole);
+        let points = nodes_of(t).map(&mut whole);
         points.iter().for_each(|p| {
             parent.entry(*p).or_insert(*p);
         });
@@ -79,7 +92,7 @@ pub(crate) fn components(head: &Head, part: usize) -> Vec<Component> {
     let mut found: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     let mut order: Vec<u32> = Vec::new();
     for t in range {
-        let p = whole(points_of(t)[0]);
+        let p = whole(nodes_of(t)[0]);
         let r = root(&mut parent, p);
         found.entry(r).or_insert_with(|| {
             order.push(r);

