@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use clap::{Subcommand, ValueEnum};
+use clap::Subcommand;
 use rubor_assets::convert::{chromophores, own_color};
 use rubor_assets::export::gltf::MapEncodings;
 use rubor_assets::{export, import, landmarks, parts, synthesize};
