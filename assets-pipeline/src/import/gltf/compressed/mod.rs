@@ -180,6 +180,9 @@ impl Expander<'_> {
     /// The primitive with accessors of its own in place of compressed ones.
     fn primitive(&mut self, at: &str, primitive: &Value, extension: &Value) -> Result<Value, ImportError> {
         let view = index(&extension["bufferView"]).map_or(&Value::Null, |v| &self.json["bufferViews"][v]);
+        if view.is_null() {
+            return Err(self.fail(at, "no such bufferView", "one with the compressed data"));
+        }
         let data = self.bytes(at, view)?;
         let room = MOST_BYTES.saturating_sub(self.data.len());
         let mesh = draco::Mesh::decode(data, room)
