@@ -79,7 +79,8 @@ fn map(side: u32, channels: u32, value: impl Fn(f32, f32, u32) -> f32) -> Map {
 fn one_command_makes_a_head_of_a_scan_and_its_maps() {
     let scan = Scan::new();
     let skin = SkinModel::new(&ChromophoreModel::default()).bake(32, 32).sample(0.05, 0.03);
-    let albedo = scan.image("color.png", &map(64, 3, |_, _, c| rubor_rig::color::srgb_encode(skin[c as usize])));
+    let albedo =
+        scan.image("color.png", &map(64, 3, |_, _, c| rubor_rig::color::srgb_encode(skin[c as usize])));
     // Leans to +x by a slope of 0.25 everywhere.
     let normal = Vec3::new(0.25, 0.0, 1.0).normalize().to_array();
     let normals = scan.image("normals.png", &map(32, 3, |_, _, c| 0.5 + 0.5 * normal[c as usize]));

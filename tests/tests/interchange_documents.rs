@@ -9,7 +9,8 @@ fn versions_on_the_page_are_those_of_the_package_file() {
     let package: serde_json::Value = serde_json::from_str(&package).unwrap();
     let page = std::fs::read_to_string(root.join("../docs/interchange.md")).unwrap();
     let version = |name: &str| {
-        let range = package["dependencies"][name].as_str().unwrap_or_else(|| panic!("{name} is not installed"));
+        let range =
+            package["dependencies"][name].as_str().unwrap_or_else(|| panic!("{name} is not installed"));
         range.trim_start_matches(['^', '~']).to_owned()
     };
     let minor = |name: &str| version(name).split('.').take(2).collect::<Vec<_>>().join(".");
