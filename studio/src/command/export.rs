@@ -56,7 +56,7 @@ pub(crate) struct Arguments {
     /// Smaller file: maps as JPEG, no normals of shapes for other viewers
     #[arg(long)]
     small: bool,
-    /// A file for the web, about a fifth of the size: geometry and animation coded (EXT_meshopt_compression, positions within
+    /// A file for the web, about a third of the size: geometry and animation coded (EXT_meshopt_compression, positions within
     /// 4 micrometres), maps as JPEG. three.js, Babylon.js, model-viewer and glTFast read it; Blender does not (.glb only)
     #[arg(long)]
     compress: bool,
