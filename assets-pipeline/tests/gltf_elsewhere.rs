@@ -158,7 +158,7 @@ fn a_head_survives_a_program_that_does_not_know_it() {
     let bytes = to_bytes(&head(), &options).unwrap();
     let expected = from_bytes(&bytes, Path::new("a.glb")).unwrap();
     let back = from_bytes(&through_another_program(&bytes, |_| {}), Path::new("b.glb")).unwrap();
-    assert_eq!(back.head, expected.head);
+    assert!(format!("{:?}", back.head) == format!("{:?}", expected.head), "the heads are equal");
     assert_eq!(back.rig, expected.rig);
     let notes: Vec<String> = back.notes.iter().map(|n| n.to_string()).collect();
     assert!(notes.iter().any(|n| n.contains("dropped by another program")), "{notes:?}");

@@ -126,9 +126,7 @@ pub(crate) fn method(
     use screen::{disk, exact, gauss, jitter, separable};
     Ok(Some(match method.validate()? {
         ScatterMethod::None => Box::new(Unscattered),
-        ScatterMethod::PreIntegrated(n) => {
-            Box::new(preintegrated::PreIntegrated::new(gpu, profile, n)?)
-        }
+        ScatterMethod::PreIntegrated(n) => Box::new(preintegrated::PreIntegrated::new(gpu, profile, n)?),
         ScatterMethod::Separable(n) => Box::new(separable::Separable::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenGauss(n) => Box::new(gauss::ScreenGauss::new(gpu, profile, n as usize)?),
         ScatterMethod::ScreenJitter => Box::new(jitter::gather(gpu, profile)),

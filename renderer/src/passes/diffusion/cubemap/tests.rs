@@ -365,7 +365,8 @@ impl Stage {
     fn draw_with(&mut self, scatter: ScatterMethod, fixes: Fixes) -> Vec<[f32; 4]> {
         self.draw(scatter);
         let ScatterMethod::DipoleCubemap(samples) = scatter else { panic!("{scatter} has no fixes") };
-        let method = DipoleCubemap::new(self.renderer.gpu(), Rasteriser::Hardware, &self.profile, samples).unwrap();
+        let method =
+            DipoleCubemap::new(self.renderer.gpu(), Rasteriser::Hardware, &self.profile, samples).unwrap();
         *self.renderer.diffusion() = Some(Box::new(method.with_fixes(fixes)));
         let drawn = self.draw(scatter);
         self.renderer.diffusion().take();
