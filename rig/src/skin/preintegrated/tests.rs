@@ -70,8 +70,10 @@ fn the_table_is_within_two_percent_of_a_walk_on_a_sphere() {
     // Photons that leave here entered at a distance of the profile, in any direction.
     let n = 6000;
     let walk = profile.channels.each_ref().map(|channel| {
+        // Even in distance and direction together, so that few tell as much as many.
         let mut photon = |i: usize| {
-            (channel.sample_radius((i as f64 + random.uniform()) / n as f64), 2.0 * PI * random.uniform())
+            let chord = channel.sample_radius((i as f64 + random.uniform()) / n as f64);
+            (chord, 2.0 * PI * (i as f64 * 0.618_033_988_749_895).fract())
         };
         (0..n).map(&mut photon).collect::<Vec<_>>()
     });
