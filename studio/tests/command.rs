@@ -248,7 +248,7 @@ fn a_head_goes_out_and_comes_back_with_its_performance() {
     let names = folder.names("");
     assert!(!names.iter().any(|n| n.contains("part")), "{names:?}");
 
-    refused(&folder, &["export", "--head", &head, "-o", &folder.path("x.fbx")], &[".glb or .usda"]);
+    refused(&folder, &["export", "--head", &head, "-o", &folder.path("x.fbx")], &[".glb, .usda or .usdz"]);
     refused(&folder, &["export", "--textures", "ktx2", "-o", &glb], &["Basis Universal"]);
     refused(&folder, &["export", "--head", &head, "--bake", "jooy", "-o", &glb], &["jooy", "\"joy\""]);
     refused(

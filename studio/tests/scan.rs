@@ -90,7 +90,7 @@ fn one_command_makes_a_head_of_a_scan_and_its_maps() {
     let flags = ["--albedo", &albedo, "--normal", &normals, "--displacement", &heights];
     let more = ["--displacement-mm", "0.5", "--specular", &gloss, "--specular-gain", "0.5"];
     let (head, said) = scan.head(&[&flags[..], &more[..]].concat());
-    assert!(said.contains("becomes skin") && said.contains("the outline stays"), "{said}");
+    assert!(said.contains("taken for skin") && said.contains("the outline stays"), "{said}");
 
     let mean = |m: &Map, c: usize| {
         let values = m.values.iter().skip(c).step_by(m.channels as usize);

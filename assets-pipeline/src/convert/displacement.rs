@@ -57,8 +57,10 @@ pub fn slopes(head: &Head, heights: &Map, range_mm: f32, side: u32) -> Result<Ma
         // Sobel: differences over two texels, smoothed across, which halves the steps of 8-bit heights.
         let across = |d: i64| at(x + d, y - 1) + 2.0 * at(x + d, y) + at(x + d, y + 1);
         let down = |d: i64| at(x - 1, y + d) + 2.0 * at(x, y + d) + at(x + 1, y + d);
-        let by_u = (across(1) - across(-1)) / 8.0 * width as f32;
-        let by_v = (down(1) - down(-1)) / 8.0 * height as f32;
+        // At the border of the map over one texel.
+        let span = |i: i64, n: u32| ((i + 1).min(i64::from(n) - 1) - (i - 1).max(0)).max(1) as f32;
+        let by_u = (across(1) - across(-1)) / (4.0 * span(x, width)) * width as f32;
+        let by_v = (down(1) - down(-1)) / (4.0 * span(y, height)) * height as f32;
         frame(head, triangle).map_or([0.0; 2], |(along_u, v_along, v_across)| {
             let by_tangent = by_u / along_u;
             [-by_tangent, -(by_tangent * v_along - by_v) / v_across]
