@@ -105,7 +105,7 @@ fn the_ict_head_is_understood() {
     };
     let folder = Path::new(&shared).join("heads/ict");
     let head = import(&Options { folder, occlusion_rays: 0, ..Options::default() }).unwrap();
-    assert_eq!((head.mesh.points.len(), head.shapes.len()), (26719, 57));
+    assert_eq!((head.mesh.points.len(), head.shapes.len()), (28167, 57));
     let triangles = |m: Material| -> u32 {
         head.mesh.parts.iter().filter(|p| p.material == m).map(|p| p.triangles.len() as u32).sum()
     };

@@ -209,7 +209,7 @@ mod tests {
             points,
             ..BlendShape::default()
         };
-        head.shapes = vec![shape("waist", vec![0]), shape("jawOpen", vec![3, 5])];
+        head.shapes = vec![shape("waist", vec![0]), shape("jawOpen", vec![3, 4, 5])];
         head
     }
 
@@ -229,7 +229,7 @@ mod tests {
             );
             assert_eq!(head.mesh.points.len(), 3);
             assert!(head.mesh.points.iter().all(|p| p.y >= 1.5));
-            assert_eq!(head.shapes[0].points, [0, 2], "offsets keep their points");
+            assert_eq!(head.shapes[0].points, [0, 1, 2], "offsets keep their points");
             assert_eq!(head.authored.second_uvs, vec![Vec2::ONE; 3]);
             assert_eq!(head.authored.of_parts, [Some(0)]);
             assert_eq!(head.authored.images.len(), 1);

@@ -139,7 +139,11 @@ fn grow_swept_lashes(head: &mut Head, sweep: impl Fn(&Head, &Chart) -> f32) {
         let lash = LASHES.iter().find(|l| part.name.ends_with(l.0));
         if let (Material::Lash, Some((name, count)), true) = (part.material, lash, uvs.all(|c| c.x <= 1.0)) {
             let sweep = sweep(head, &chart);
-            grown.push((index, part.name.clone(), lash_strands(&chart, *count, *name == "upper", sweep)));
+            let strands = lash_strands(&chart, *count, *name == "upper", sweep);
+            // A card on which nothing grows stays a card.
+            if !strands.is_empty() {
+                grown.push((index, part.name.clone(), strands));
+            }
         }
     }
     for (_, name, strands) in &grown {
