@@ -218,21 +218,19 @@ fn frame(renderer: &mut Renderer, scene: &Scene<'_>, method: RasterMethod) -> Fr
 }
 
 /// Share of pixels with another triangle, and mean difference of the channels of the picture. Where the triangle is the
-/// same, so is its depth, up to rounding and to the change of depth over 1/128 of a pixel: both ways round corners to
-/// 1/256.
+/// same, so is its depth, up to rounding and to the change of depth over 1/128 of a pixel each way: both round corners
+/// to 1/256.
 fn difference(a: &Frame, b: &Frame) -> (f64, f64) {
     let side = SIDE as usize;
     for i in 0..side * side {
         if a.ids[i] != b.ids[i] {
             continue;
         }
-        let neighbours = [i.saturating_sub(1), i + 1, i.saturating_sub(side), i + side];
         let depth = a.depths[i];
-        let change = neighbours
-            .into_iter()
-            .filter_map(|n| a.depths.get(n).filter(|d| **d > 0.0))
-            .fold(0.0f32, |most, d| most.max((d - depth).abs()));
-        let bound = 1e-5 * depth + change / 128.0;
+        let change = |n: Option<&f32>| n.filter(|d| **d > 0.0).map_or(0.0, |d| (d - depth).abs());
+        let across = change(a.depths.get(i + 1)).max(change(a.depths.get(i.wrapping_sub(1))));
+        let down = change(a.depths.get(i + side)).max(change(a.depths.get(i.wrapping_sub(side))));
+        let bound = 1e-5 * depth + (across + down) / 128.0;
         assert!((depth - b.depths[i]).abs() <= bound, "{depth} {} in pixel {i}, bound {bound}", b.depths[i]);
     }
     let pixels = (side * side) as f64;
