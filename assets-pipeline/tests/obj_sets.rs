@@ -109,8 +109,9 @@ fn the_ict_head_is_understood() {
     let triangles = |m: Material| -> u32 {
         head.mesh.parts.iter().filter(|p| p.material == m).map(|p| p.triangles.len() as u32).sum()
     };
-    // 25 836 quads and 548 triangles.
-    assert_eq!(head.mesh.triangles.len(), 2 * 25836 + 548);
+    // 25 836 quads and 548 triangles, of which cards of lashes became hairs.
+    let others = head.mesh.triangles.len() as u32 - triangles(Material::Lash);
+    assert!((51_000..=2 * 25836 + 548).contains(&others), "{others}");
     for m in
         [Material::Skin, Material::Mucosa, Material::Eye, Material::Teeth, Material::Gums, Material::Lash]
     {

@@ -53,6 +53,7 @@ pub(crate) struct Methods {
     pub(crate) color: &'static str,
     pub(crate) wrinkles: &'static str,
     pub(crate) specular: &'static str,
+    pub(crate) raster: &'static str,
     pub(crate) antialias: &'static str,
     pub(crate) tone_map: &'static str,
     pub(crate) exposure: f32,
@@ -83,6 +84,7 @@ const USUAL: Methods = Methods {
     color: "hemoglobin",
     wrinkles: "partial-derivative",
     specular: "one-lobe",
+    raster: "auto",
     antialias: "none",
     tone_map: "filmic",
     exposure: 1.0,
@@ -110,6 +112,7 @@ impl Methods {
             "color" => self.color,
             "wrinkles" => self.wrinkles,
             "specular" => self.specular,
+            "raster" => self.raster,
             "antialias" => self.antialias,
             "tone-map" => self.tone_map,
             _ => return None,
@@ -119,7 +122,7 @@ impl Methods {
 
 /// All pictures.
 pub(crate) fn all() -> Vec<Case> {
-    [scatter(), transmit(), appearance(), antialias(), lights(), materials(), passes(), heads()].concat()
+    [scatter(), transmit(), appearance(), antialias(), lights(), materials(), passes(), raster(), heads()].concat()
 }
 
 fn scatter() -> Vec<Case> {
@@ -171,6 +174,15 @@ fn transmit() -> Vec<Case> {
     let through = Methods { scatter: "dipole-cubemap:16", exposure: 1.4, ..USUAL };
     all.push(case("transmit-dipole-cubemap", "ear", through));
     all
+}
+
+/// Alpha with holes and a shadow, by both ways to make pixels of triangles.
+fn raster() -> Vec<Case> {
+    ["hardware", "compute"].map(|raster| Case {
+        models: &[Model::Authored],
+        ..case(&format!("raster-{raster}"), "portrait", Methods { raster, ..USUAL })
+    })
+    .to_vec()
 }
 
 fn appearance() -> Vec<Case> {

@@ -233,6 +233,7 @@ impl Stage {
                 transmit: methods.transmit.parse()?,
                 curvature: methods.curvature.parse()?,
                 color: methods.color.parse()?,
+                raster: methods.raster.parse()?,
                 wrinkles: methods.wrinkles.parse()?,
                 specular: methods.specular.parse()?,
                 antialias: methods.antialias.parse()?,
