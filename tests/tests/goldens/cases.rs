@@ -122,7 +122,8 @@ impl Methods {
 
 /// All pictures.
 pub(crate) fn all() -> Vec<Case> {
-    [scatter(), transmit(), appearance(), antialias(), lights(), materials(), passes(), raster(), heads()].concat()
+    [scatter(), transmit(), appearance(), antialias(), lights(), materials(), passes(), raster(), heads()]
+        .concat()
 }
 
 fn scatter() -> Vec<Case> {
@@ -178,11 +179,12 @@ fn transmit() -> Vec<Case> {
 
 /// Alpha with holes and a shadow, by both ways to make pixels of triangles.
 fn raster() -> Vec<Case> {
-    ["hardware", "compute"].map(|raster| Case {
-        models: &[Model::Authored],
-        ..case(&format!("raster-{raster}"), "portrait", Methods { raster, ..USUAL })
-    })
-    .to_vec()
+    ["hardware", "compute"]
+        .map(|raster| Case {
+            models: &[Model::Authored],
+            ..case(&format!("raster-{raster}"), "portrait", Methods { raster, ..USUAL })
+        })
+        .to_vec()
 }
 
 fn appearance() -> Vec<Case> {

@@ -14,7 +14,7 @@
 //! `shade`).
 //!
 //! Savings (Jimenez 2012 ch. 3): skin that faces away by more than 105 degrees is left out (culled), the map is halved
-//! while a texel stays within half a pixel of the nearest part of the head (sized, eqs. 3.1 and 3.2 in powers of two), skin
+//! while a texel stays within a quarter of a pixel of the nearest part of the head (sized, eqs. 3.1 and 3.2 in powers of two), skin
 //! outside of the picture is left out (clipped, with a border as wide as light scatters).
 //!
 //! Differs from the sources: the layout is not the author's (see `rubor_rig::atlas`: even texels, margins that continue
@@ -404,9 +404,9 @@ fn nearest_pixel_mm(frame: &Before<'_>, head: &PosedHead<'_>) -> f32 {
     MM_PER_METRE * distance.max(0.0) / pixels_per_radian
 }
 
-/// Halvings of a map while its texels stay as narrow as half a pixel (Jimenez 2012 eqs. 3.1 and 3.2, in powers of two).
+/// Halvings of a map while its texels stay as narrow as a quarter of a pixel (Jimenez 2012 eqs. 3.1 and 3.2, in powers of two).
 fn sized_level(mm_per_texel: f32, pixel_mm: f32) -> u32 {
-    let ratio = 0.5 * pixel_mm / mm_per_texel;
+    let ratio = 0.25 * pixel_mm / mm_per_texel;
     if ratio >= 1.0 { (ratio.log2().floor() as u32).min(MOST_LEVELS) } else { 0 }
 }
 

@@ -595,6 +595,6 @@ fn memory_is_that_of_the_method_in_use() {
 
 #[test]
 fn maps_shrink_with_the_distance() {
-    let levels = [0.0, 0.1, 1.39, 1.41, 2.9, 5.7, 100.0].map(|pixel| sized_level(0.35, pixel));
+    let levels = [0.0, 0.1, 2.79, 2.81, 5.8, 11.4, 100.0].map(|pixel| sized_level(0.35, pixel));
     assert_eq!(levels, [0, 0, 0, 1, 2, 3, 3]);
 }
