@@ -155,10 +155,16 @@ impl Truth {
 /// A frame, and its diffuse light before albedo with the strength of scattering.
 fn draw(studio: &mut Studio, shots: &[Shot], settings: &Settings) -> Outcome<(Frame, Vec<[f32; 4]>)> {
     let mut settings = settings.clone();
-    settings.output.channels = vec![Channel::Diffuse];
+    settings.output.channels = vec![Channel::Diffuse, Channel::Albedo];
     studio.cut(0);
     let frame = studio.render(shots, 0.0, &settings)?;
-    let diffuse = frame.channels.first().map(|c| c.texels().collect()).unwrap_or_default();
+    // The fourth component of the diffuse light is for the methods on the screen.
+    let diffuse = match frame.channels.as_slice() {
+        [diffuse, albedo] => (diffuse.texels::<4>().zip(albedo.texels::<4>()))
+            .map(|(light, albedo)| [light[0], light[1], light[2], albedo[3]])
+            .collect(),
+        _ => Vec::new(),
+    };
     Ok((frame, diffuse))
 }
 
