@@ -243,7 +243,8 @@ pub fn shared_texels(skin: &Skin<'_>, side: u32) -> f64 {
         let (low, high) = ((a.min(b).min(c) - 0.5).floor(), (a.max(b).max(c) - 0.5).ceil());
         let farthest = low.abs().max(high.abs()).max_element();
         // Also false for what is not a number.
-        if !(farthest < FARTHEST_TILE * f64::from(side))
+        if farthest.is_nan()
+            || farthest >= FARTHEST_TILE * f64::from(side)
             || det == 0.0
             || (high - low).max_element() > 2.0 * f64::from(side)
         {
