@@ -40,10 +40,10 @@ fn main() -> Result<(), SkinError> {
         let sphere = light(Shape::Sphere, radius);
         println!(
             "| {radius} | {} | {} | {} | {} |",
-            largest(|c, x| Ok(table.sample(x, 1.0 / radius)[c]), &sphere)?,
-            largest(light(Shape::Cylinder, radius), &sphere)?,
-            largest(light(Shape::Ring, radius), &sphere)?,
-            largest(|_, x| Ok(x.max(0.0)), &sphere)?,
+            largest(|c, x| Ok(table.sample(x, 1.0 / radius)[c]), sphere)?,
+            largest(light(Shape::Cylinder, radius), sphere)?,
+            largest(light(Shape::Ring, radius), sphere)?,
+            largest(|_, x| Ok(x.max(0.0)), sphere)?,
         );
     }
     println!("\nA cylinder lit across its axis, looked up in the table of spheres by a curvature\n");

@@ -190,8 +190,8 @@ mod tests {
 
     #[test]
     fn channels_of_pictures_of_two_sizes_meet() {
-        let mut gallery = Gallery::default();
-        gallery.images = vec![picture(1, 1, [10, 20, 30, 40]), picture(2, 3, [128, 128, 250, 255])];
+        let images = vec![picture(1, 1, [10, 20, 30, 40]), picture(2, 3, [128, 128, 250, 255])];
+        let mut gallery = Gallery { images, ..Gallery::default() };
         let channels = [Channel::Value(7), Channel::Of(0, 1), Channel::Of(1, 2), Channel::Of(0, 3)];
         let made = gallery.combine("made", channels) as usize;
         assert_eq!((gallery.images[made].width, gallery.images[made].height), (2, 3));

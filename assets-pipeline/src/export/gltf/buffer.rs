@@ -353,7 +353,9 @@ impl Buffer {
         if self.fallback_bytes > 0 {
             let fallback =
                 json!({"byteLength": self.fallback_bytes, "extensions": {meshopt::NAME: {"fallback": true}}});
-            document["buffers"].as_array_mut().map(|buffers| buffers.push(fallback));
+            if let Some(buffers) = document["buffers"].as_array_mut() {
+                buffers.push(fallback);
+            }
         }
         document["bufferViews"] = Value::Array(self.views);
         document["accessors"] = Value::Array(self.accessors);

@@ -10,6 +10,7 @@
 //! Source: the specifications VRM 0.0 and VRMC_vrm 1.0 of the VRM Consortium.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use glam::Vec3;
 use rubor_rig::expression::{Expression, Rig};
@@ -162,10 +163,14 @@ impl Table<'_> {
                 *most = most.max(weight);
             }
         }
-        if self.expressions.contains_key(&name) {
-            self.notes.add("of expressions with one name only the first is read", name);
-        } else if !shapes.is_empty() {
-            self.expressions.insert(name, Expression { shapes, ..Expression::default() });
+        match self.expressions.entry(name) {
+            Entry::Occupied(known) => {
+                self.notes.add("of expressions with one name only the first is read", known.key().as_str());
+            }
+            Entry::Vacant(free) if !shapes.is_empty() => {
+                free.insert(Expression { shapes, ..Expression::default() });
+            }
+            Entry::Vacant(_) => {}
         }
     }
 

@@ -133,7 +133,7 @@ fn what_is_opaque_hides_and_shows_through() {
     many.drain(1..3);
     close(found, over(&many));
     // Nothing to see through: nothing changes.
-    close(middle(&draw(&mut renderer, &[wall.clone()])), over(&[wall]));
+    close(middle(&draw(&mut renderer, std::slice::from_ref(&wall))), over(std::slice::from_ref(&wall)));
 }
 
 #[test]

@@ -115,7 +115,7 @@ fn a_sphere_keeps_its_light_and_weakens_its_bands() {
             for cosine in [0.1, 0.4, 0.9] {
                 assert!((d(cosine) - d(-cosine) - first * cosine).abs() < 1e-9);
             }
-            assert!(second <= first && first <= 1.0 && first >= 0.0, "{radius}: {first} {second}");
+            assert!(second <= first && (0.0..=1.0).contains(&first), "{radius}: {first} {second}");
         }
     }
 }

@@ -54,7 +54,7 @@ impl Layer {
         xyz(self.origin) + z * xyz(self.forward) + across * scale
     }
 
-    fn to_viewer(&self, position: DVec3) -> DVec3 {
+    fn to_viewer(self, position: DVec3) -> DVec3 {
         if self.is_perspective() { (xyz(self.origin) - position).normalize() } else { -xyz(self.forward) }
     }
 }
@@ -106,10 +106,10 @@ impl Texels<'_> {
         let noise = (52.982_918f32 * (x * 0.067_110_56 + y * 0.005_837_15).fract()).fract();
         let turn = DVec2::from_angle(TAU * f64::from(noise));
         let end = if cube.has_sky != 0 { cube.layers } else { cube.lamps };
-        (0..end as usize).map(|i| self.from_layer(profile, samples, i, (position, own), turn)).sum()
+        (0..end as usize).map(|i| self.of_layer(profile, samples, i, (position, own), turn)).sum()
     }
 
-    fn from_layer(
+    fn of_layer(
         &self,
         profile: &Profile,
         samples: &Samples,

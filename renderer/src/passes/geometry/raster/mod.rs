@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! positions, corners --raster_each--> keys of pixels (small triangles), list of large ones
-//! list               --raster_large-> keys of pixels, one workgroup per triangle
+//! list               --raster_large-> keys of pixels, one workgroup per triangle; raster_rest where the list is too short
 //! keys               --raster_resolve--> ids (r32uint), depth (r32float); keys are zero again
 //! ```
 //!
@@ -33,7 +33,7 @@ use crate::scene::{MAX_HEADS, PosedHead};
 const SHADER: Module = module!("raster", "raster.wesl");
 const RESOLVE_SHADER: Module = module!("raster_resolve", "resolve.wesl");
 
-/// Large triangles of a head that the list holds; further ones are drawn by the invocation that finds them.
+/// Large triangles of a head that the list holds; with more, each is drawn by one invocation (`raster_rest`).
 const LARGE_CAPACITY: u32 = 4096;
 /// Workgroups that share the large triangles of a head.
 const LARGE_GROUPS: u32 = 128;
@@ -112,6 +112,7 @@ pub(crate) fn resolve_program(sight: Sight) -> Program {
 struct Fill {
     each: Kernel,
     large: Kernel,
+    rest: Kernel,
 }
 
 /// The pipelines of a sight, and the keys of its pixels, which are zero between frames.
@@ -135,6 +136,7 @@ impl Fill {
         Self {
             each: Kernel::new(gpu, label, &program, "raster_each"),
             large: Kernel::new(gpu, label, &program, "raster_large"),
+            rest: Kernel::new(gpu, label, &program, "raster_rest"),
         }
     }
 }
@@ -258,8 +260,10 @@ impl ComputeRaster {
         let each =
             drawn.iter().map(|(resources, count)| (resources.clone(), [count.div_ceil(64), layers, 1]));
         r.dispatch_each(&fill.each, each);
-        let large = drawn.into_iter().map(|(resources, _)| (resources, [LARGE_GROUPS, 1, 1]));
+        let large = drawn.iter().map(|(resources, _)| (resources.clone(), [LARGE_GROUPS, 1, 1]));
         r.dispatch_each(&fill.large, large);
+        let rest = drawn.into_iter().map(|(resources, count)| (resources, [count.div_ceil(64), layers, 1]));
+        r.dispatch_each(&fill.rest, rest);
     }
 
     /// Ids (0 = nothing) and reversed depth of what a camera sees.
