@@ -8,7 +8,6 @@ use rubor_assets::error::{ExportError, ImportError};
 use rubor_assets::export::gltf::{MapEncoding, MapEncodings, Options, export, to_bytes};
 use rubor_assets::export::{TextureFormat, top_shapes};
 use rubor_assets::import::gltf::from_bytes;
-use rubor_rig::expression::Rig;
 use rubor_rig::head::{Head, Vertex};
 use rubor_rig::map::Map;
 use rubor_rig::timeline::Sequence;

@@ -9,7 +9,7 @@ use rubor_assets::import;
 use rubor_rig::head::{Head, Material, Mesh, Part, Vertex};
 
 /// The built-in head without maps and shapes; its landmarks are the truth.
-pub fn default_head() -> Head {
+pub(crate) fn default_head() -> Head {
     static HEAD: LazyLock<Head> = LazyLock::new(|| {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/head.glb"));
         let mut head = import::gltf::from_bytes(&std::fs::read(path).unwrap(), path).unwrap().head;
@@ -21,7 +21,7 @@ pub fn default_head() -> Head {
 }
 
 /// The triangles of a head whose material and middle are wanted, with the points that they use.
-pub fn keep(head: &Head, wanted: impl Fn(Material, Vec3) -> bool) -> Head {
+pub(crate) fn keep(head: &Head, wanted: impl Fn(Material, Vec3) -> bool) -> Head {
     let mut mesh = Mesh::default();
     let mut new_point = vec![u32::MAX; head.mesh.points.len()];
     for part in &head.mesh.parts {
@@ -52,14 +52,14 @@ pub fn keep(head: &Head, wanted: impl Fn(Material, Vec3) -> bool) -> Head {
 }
 
 /// Every point and landmark moved.
-pub fn moved(mut head: Head, by: impl Fn(Vec3) -> Vec3) -> Head {
+pub(crate) fn moved(mut head: Head, by: impl Fn(Vec3) -> Vec3) -> Head {
     head.mesh.points.iter_mut().for_each(|p| *p = by(*p));
     head.landmarks.values_mut().for_each(|p| *p = by(*p));
     head
 }
 
 /// Another person: the head bent by smooth random functions of some millimetres, the same on both sides but for a fifth.
-pub fn another_person(head: Head, seed: u64, amount_mm: f32) -> Head {
+pub(crate) fn another_person(head: Head, seed: u64, amount_mm: f32) -> Head {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut signed = move || 2.0 * random.f32() - 1.0;
     let (low, high) = head.bounds().unwrap();
@@ -88,7 +88,7 @@ pub fn another_person(head: Head, seed: u64, amount_mm: f32) -> Head {
 }
 
 /// Noise of a scanner, in all directions.
-pub fn noisy(mut head: Head, seed: u64, amount_mm: f32) -> Head {
+pub(crate) fn noisy(mut head: Head, seed: u64, amount_mm: f32) -> Head {
     let mut random = fastrand::Rng::with_seed(seed);
     for p in &mut head.mesh.points {
         let mut normal = || (0..4).map(|_| random.f32() - 0.5).sum::<f32>() * 1.73;
@@ -97,14 +97,14 @@ pub fn noisy(mut head: Head, seed: u64, amount_mm: f32) -> Head {
     head
 }
 
-pub fn turn(seed: u64) -> Mat3 {
+pub(crate) fn turn(seed: u64) -> Mat3 {
     let mut random = fastrand::Rng::with_seed(seed);
     let axis = Vec3::new(random.f32() - 0.5, random.f32() - 0.5, random.f32() - 0.5).normalize_or(Vec3::Y);
     Mat3::from_axis_angle(axis, random.f32() * 6.0)
 }
 
 /// A head of one closed surface given as distance from its middle by direction (metres), without landmarks.
-pub fn star(rows: usize, radius: impl Fn(Vec3) -> f32) -> Head {
+pub(crate) fn star(rows: usize, radius: impl Fn(Vec3) -> f32) -> Head {
     let mut mesh = Mesh::default();
     let columns = 2 * rows;
     for j in 0..=rows {
@@ -133,7 +133,7 @@ pub fn star(rows: usize, radius: impl Fn(Vec3) -> f32) -> Head {
 
 /// A coarse face of an egg, a wedge for a nose and a few dents and swellings; 1 unit is a head's radius. `amount` scales all of
 /// its features.
-pub fn made_up_face(amount: f32) -> Head {
+pub(crate) fn made_up_face(amount: f32) -> Head {
     star(64, |d| {
         let egg = 1.0 / Vec3::new(d.x / 0.76, d.y / if d.y > 0.0 { 1.0 } else { 1.12 }, d.z / 0.95).length();
         if d.z <= 0.0 {
@@ -162,7 +162,7 @@ pub fn made_up_face(amount: f32) -> Head {
 }
 
 /// Capsules one after another, each from a place to a place with a radius.
-pub fn capsules(list: &[(Vec3, Vec3, f32)]) -> Head {
+pub(crate) fn capsules(list: &[(Vec3, Vec3, f32)]) -> Head {
     let mut all = Head { name: "made up".into(), ..Head::default() };
     for (from, to, radius) in list {
         let one = star(14, |_| 1.0);
@@ -186,7 +186,7 @@ pub fn capsules(list: &[(Vec3, Vec3, f32)]) -> Head {
 }
 
 /// Things without a face, by name.
-pub fn no_faces() -> Vec<(&'static str, Head)> {
+pub(crate) fn no_faces() -> Vec<(&'static str, Head)> {
     let wave = |seed: u64| {
         let mut random = fastrand::Rng::with_seed(seed);
         let waves: Vec<(Vec3, f32, f32)> = (0..10)
