@@ -51,8 +51,7 @@ fn main() -> Result<(), SkinError> {
     for radius in RADII_MM {
         let k = [1.0 / radius, 0.0];
         let exact = light(Shape::Cylinder, radius);
-        let by =
-            |curvature: &dyn Fn(f64) -> f64| largest(|c, x| Ok(table.sample(x, curvature(x))[c]), exact);
+        let by = |curvature: &dyn Fn(f64) -> f64| largest(|c, x| Ok(table.sample(x, curvature(x))[c]), exact);
         println!(
             "| {radius} | {} | {} | {} |",
             by(&|_| 0.5 / radius)?,

@@ -18,8 +18,7 @@
 //!
 //! Differs from hardware: depth is interpolated in `f32` from the rounded corners (1e-6 of the depth at most in tests).
 //!
-//! Why: on GPUs with few raster units for their compute units this is several times faster (docs/speed.md), on others
-//! and on software drivers it is slower; [`crate::settings::RasterMethod::Auto`] asks for a measurement.
+//! Costs are in docs/raster.md; [`crate::settings::RasterMethod::Auto`] uses it only where it was measured to be faster.
 
 #[cfg(test)]
 mod tests;
