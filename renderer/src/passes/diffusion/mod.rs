@@ -22,10 +22,10 @@ use std::sync::Arc;
 
 use rubor_rig::skin::profile::Profile;
 
-use crate::device::{Gpu, Image, Recorder};
+use crate::device::{Gpu, Image, ImageSpec, Recorder};
 use crate::error::RenderError;
 use crate::passes::geometry::raster::Rasteriser;
-use crate::passes::shade::{Lit, Shade, SkinLight, Transmittance};
+use crate::passes::shade::{Lighting, Lit, Shade, SkinLight, Transmittance};
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
 use crate::scene::{HeadInstance, PosedHead, Scene};
@@ -62,6 +62,28 @@ pub(crate) struct Before<'a> {
     pub(crate) view: wgpu::Buffer,
     pub(crate) shade: &'a Shade,
     pub(crate) transmittance: Option<&'a Transmittance>,
+}
+
+impl Before<'_> {
+    /// What light on the whole surface has in place of a picture: images that belong to pixels are not used.
+    pub(crate) fn without_picture(&self, r: &mut Recorder<'_>) -> Seen {
+        Seen {
+            view: self.view.clone(),
+            pixels_per_mm: 1.0,
+            ids: r.image("no ids", ImageSpec::attachment([1, 1], wgpu::TextureFormat::R32Uint)),
+            depth: r.image("no depth", ImageSpec::attachment([1, 1], wgpu::TextureFormat::Depth32Float)),
+        }
+    }
+
+    /// The light of the frame on what was made by [`Before::without_picture`].
+    pub(crate) fn lighting<'a>(
+        &'a self,
+        seen: &'a Seen,
+        transmittance: Option<&'a Transmittance>,
+    ) -> Lighting<'a> {
+        let (light, quality) = (self.light, self.quality);
+        Lighting { light, seen, first: None, transmittance, quality, skin_light: None }
+    }
 }
 
 /// A method that draws a frame in one go. Every hook is optional.

@@ -64,7 +64,7 @@ use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
 use crate::error::RenderError;
 use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::pixel_groups;
-use crate::passes::shade::{self, Lighting, Lit};
+use crate::passes::shade::{self, Lit};
 use crate::scene::view::Seen;
 use crate::scene::{Light, PosedHead, Scene};
 use crate::settings::Quality;
@@ -498,21 +498,8 @@ impl DipoleCubemap {
 
         let array = |format| ImageSpec::storage([side; 2], format);
         let texels = r.image("texels", array(wgpu::TextureFormat::Rgba32Uint).layers(count));
-        // Light on layers has no picture: what belongs to pixels is not used.
-        let seen = Seen {
-            view: frame.view.clone(),
-            pixels_per_mm: 1.0,
-            ids: r.image("no ids", ImageSpec::attachment([1, 1], wgpu::TextureFormat::R32Uint)),
-            depth: r.image("no depth", ImageSpec::attachment([1, 1], wgpu::TextureFormat::Depth32Float)),
-        };
-        let lighting = Lighting {
-            light: frame.light,
-            seen: &seen,
-            first: None,
-            transmittance: None,
-            quality: frame.quality,
-            skin_light: None,
-        };
+        let seen = frame.without_picture(r);
+        let lighting = frame.lighting(&seen, None);
         let params = r.uniform("shade layers", &shade::params(&lighting, head));
         let mut resources = frame.shade.resources(&lighting, head, &params);
         resources.extend([

@@ -52,7 +52,7 @@ use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder};
 use crate::error::RenderError;
 use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::pixel_groups;
-use crate::passes::shade::{self, Lighting, Lit};
+use crate::passes::shade::{self, Lit};
 use crate::scene::head::Surface;
 use crate::scene::view::Seen;
 use crate::scene::{HeadInstance, PosedHead};
@@ -241,21 +241,8 @@ impl TextureSpace {
     }
 
     fn record_light(&mut self, r: &mut Recorder<'_>, frame: &Before<'_>) {
-        // Light on maps has no picture: what belongs to pixels is not used.
-        let seen = Seen {
-            view: frame.view.clone(),
-            pixels_per_mm: 1.0,
-            ids: r.image("no ids", ImageSpec::attachment([1, 1], wgpu::TextureFormat::R32Uint)),
-            depth: r.image("no depth", ImageSpec::attachment([1, 1], wgpu::TextureFormat::Depth32Float)),
-        };
-        let lighting = Lighting {
-            light: frame.light,
-            seen: &seen,
-            first: None,
-            transmittance: frame.transmittance,
-            quality: frame.quality,
-            skin_light: None,
-        };
+        let seen = frame.without_picture(r);
+        let lighting = frame.lighting(&seen, frame.transmittance);
         let mut maps = Vec::new();
         let mut numbers = Vec::new();
         for head in frame.heads {

@@ -26,9 +26,9 @@ use crate::passes::diffusion::Before;
 use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::geometry::visibility::Visibility;
 use crate::passes::pixel_groups;
-use crate::passes::shade::{self, Lighting};
+use crate::passes::shade;
 use crate::scene::MAX_LIGHTS;
-use crate::scene::view::{Seen, View};
+use crate::scene::view::View;
 
 const SHADER: Module = module!("texture_through", "through.wesl");
 
@@ -108,20 +108,8 @@ impl TextureSpace {
     pub(super) fn record_through(&mut self, r: &mut Recorder<'_>, frame: &Before<'_>) {
         let through = self.through.take().unwrap_or_else(|| Through::new(r.gpu, self.rasteriser));
         let ids = through.lamp_ids(r, frame);
-        let seen = Seen {
-            view: frame.view.clone(),
-            pixels_per_mm: 1.0,
-            ids: r.image("no ids", ImageSpec::attachment([1, 1], wgpu::TextureFormat::R32Uint)),
-            depth: r.image("no depth", ImageSpec::attachment([1, 1], wgpu::TextureFormat::Depth32Float)),
-        };
-        let lighting = Lighting {
-            light: frame.light,
-            seen: &seen,
-            first: None,
-            transmittance: None,
-            quality: frame.quality,
-            skin_light: None,
-        };
+        let seen = frame.without_picture(r);
+        let lighting = frame.lighting(&seen, None);
         let lamps = frame
             .light
             .lights
