@@ -37,6 +37,9 @@ const LARGE_CAPACITY: u32 = 8192;
 /// Workgroups that share the large triangles of a head.
 const LARGE_GROUPS: u32 = 1024;
 
+/// Rows of pixels of a workgroup of `raster_resolve`.
+const RESOLVED_ROWS: u32 = 32;
+
 /// What draws triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Rasteriser {
@@ -319,6 +322,6 @@ impl ComputeRaster {
             ("nearest", self.nearest.bound()),
         ];
         resources.extend(out.iter().cloned());
-        r.dispatch(&self.resolve, &resources, [size[0].div_ceil(8), size[1].div_ceil(8), layers]);
+        r.dispatch(&self.resolve, &resources, [size[0].div_ceil(8), size[1].div_ceil(RESOLVED_ROWS), layers]);
     }
 }
