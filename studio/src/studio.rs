@@ -248,7 +248,7 @@ impl Studio {
             .zip(shots)
             .enumerate()
             .map(|(i, (head, shot))| HeadInstance {
-                head: &**head,
+                head,
                 state: &shot.face,
                 world_from_head: Mat4::from_translation(Vec3::X * ((i as f32 - middle) * spacing_m)),
             })
