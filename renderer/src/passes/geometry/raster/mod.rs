@@ -33,7 +33,7 @@ const SHADER: Module = module!("raster", "raster.wesl");
 const RESOLVE_SHADER: Module = module!("raster_resolve", "resolve.wesl");
 
 /// Large triangles of a head that the list holds; with more, each is drawn by one invocation (`raster_rest`).
-const LARGE_CAPACITY: u32 = 8192;
+const LARGE_CAPACITY: u32 = 32768;
 /// Workgroups that share the large triangles of a head.
 const LARGE_GROUPS: u32 = 1024;
 

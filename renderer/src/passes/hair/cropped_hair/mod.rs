@@ -50,7 +50,7 @@ pub(crate) struct Params {
 /// Width of a hair at its root, metres.
 const WIDTH_METRES: f32 = 0.00014;
 /// Width in pixels of the hairs that are drawn, together with those that they stand for.
-const PIXELS_OF_HAIR: f32 = 0.25;
+const PIXELS_OF_HAIR: f32 = 0.35;
 
 /// The pipelines of the pass.
 pub(crate) struct CroppedHair {
