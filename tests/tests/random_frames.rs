@@ -153,10 +153,11 @@ fn sequence(dice: &mut Dice, expressions: usize) -> Value {
     let kinds = ["directional", "point", "spot"];
     let lights: Vec<Value> = (0..dice.below(4))
         .map(|_| {
+            let brightest = if dice.below(5) == 0 { 1e5 } else { 3.0 };
             json!({
                 "kind": dice.one(&kinds), "position": [dice.number(-1.0, 1.0), dice.number(-1.0, 1.0), dice.number(-0.5, 1.0)],
                 "direction": [dice.number(-1.0, 1.0), -0.3, dice.number(-1.0, 1.0)], "color": [1.0, dice.number(0.0, 1.0), 0.5],
-                "intensity": dice.track(0.0, if dice.below(5) == 0 { 1e5 } else { 3.0 }), "shadow": dice.below(2) == 0,
+                "intensity": dice.track(0.0, brightest), "shadow": dice.below(2) == 0,
                 "coneDegrees": [dice.number(0.0, 30.0), dice.number(31.0, 120.0)],
             })
         })

@@ -47,8 +47,8 @@ fn obj_cases() -> Vec<Case> {
     all.push(obj("faces-10M", || TRIANGLE.to_owned() + &"f 1 2 3\n".repeat(10_000_000)));
     all.push(obj("face-of-100000-corners", || {
         let point = |i: usize| {
-            let a = i as f64 * 6.283 / 100_000.0;
-            let r = if i % 2 == 0 { 1.0 } else { 0.5 };
+            let a = i as f64 * std::f64::consts::TAU / 100_000.0;
+            let r = if i.is_multiple_of(2) { 1.0 } else { 0.5 };
             format!("v {} {} 0\n", r * a.cos(), r * a.sin())
         };
         let corners: String = (1..=100_000).map(|i| format!(" {i}")).collect();
