@@ -25,8 +25,8 @@ echo "date: $(date -u +%Y-%m-%d), $(nproc) cores"
 test="$cargo test --release --locked -p rubor"
 # Up to 5 minutes, 4, 1, 2, 3, 2.
 env_step "hostile files" "RUBOR_HOSTILE=all" $test --test hostile -- --nocapture
-env_step "kill -9" "RUBOR_KILLS=${KILLS:-34}" $test --test folders -- --nocapture killed
-step "folders" $test --test folders -- stopped chunks limits
+env_step "kill -9" "RUBOR_KILLS=${KILLS:-34}" $test --test folders -- --nocapture --ignored
+step "folders" $test --test folders --test frames
 step "openjd" sh tests/openjd/run.sh "${CARGO_TARGET_DIR:-target}/release/rubor"
 env_step "random frames" "RUBOR_PROPERTIES=10000 RUBOR_PROPERTY_SECONDS=${PROPERTY_SECONDS:-180}" \
     $cargo test --release --locked -p rubor-tests --test random_frames -- --nocapture

@@ -198,6 +198,15 @@ pub fn check_text(text: &[u8]) -> std::result::Result<(), Excess> {
     within("bytes of text", text.len() as u64, Limits::of_process().text_bytes())
 }
 
+/// Refuses a text with a line of more than a sixteenth of [`Limits::text_bytes`]: tables are held by rows.
+///
+/// # Errors
+/// What was found and what is allowed.
+pub fn check_lines(text: &[u8]) -> std::result::Result<(), Excess> {
+    let longest = text.split(|b| *b == b'\n').map(<[u8]>::len).max().unwrap_or(0);
+    within("bytes in a line", longest as u64, Limits::of_process().text_bytes() / 16)
+}
+
 /// Refuses a text with brackets (JSON, USD) whose values, `copies` times in memory, would take more than may be taken.
 ///
 /// An estimate from above: 640 bytes for an object, the smallest node of a tree map; 72 for a value, twice its size as

@@ -323,8 +323,8 @@ impl FrameList {
     }
 }
 
-/// Longest run of frames in a list.
-const MOST_FRAMES: u32 = 1_000_000;
+/// Most frames of a list and of a run: more than a day at 100 frames a second.
+pub const MOST_FRAMES: u32 = 10_000_000;
 
 impl FromStr for FrameList {
     type Err = String;
@@ -336,8 +336,11 @@ impl FromStr for FrameList {
             let (first, last) = part.split_once('-').unwrap_or((part, part));
             let first: u32 = first.trim().parse().map_err(|_| wrong())?;
             let last: u32 = last.trim().parse().map_err(|_| wrong())?;
-            if first == 0 || last < first || last - first > MOST_FRAMES {
+            if first == 0 || last < first {
                 return Err(wrong());
+            }
+            if numbers.len() as u64 + u64::from(last - first) >= u64::from(MOST_FRAMES) {
+                return Err(format!("found more than {MOST_FRAMES} frames, expected fewer in one list"));
             }
             numbers.extend(first..=last);
         }

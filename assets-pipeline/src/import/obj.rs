@@ -18,7 +18,7 @@
 //! - large indices overflow in it, and its errors have no place: indices are checked before, and a line is sought after.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
@@ -26,7 +26,7 @@ use rubor_rig::limits::{self, Limits};
 
 use crate::error::ImportError;
 use crate::notes::{Note, Notes};
-use crate::poly::{Corner, PolyMesh};
+use crate::poly::{Corner, MOST_CORNERS, PolyMesh};
 
 /// Which statement names the groups of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -202,6 +202,7 @@ struct Reader<'a> {
     without_uv: Vec<bool>,
     faces_without_uv: usize,
     libraries: Vec<String>,
+    known_libraries: HashSet<String>,
     names: HashMap<String, u32>,
     groups: Vec<String>,
     group: Option<u32>,
@@ -225,6 +226,7 @@ impl<'a> Reader<'a> {
             without_uv: Vec::new(),
             faces_without_uv: 0,
             libraries: Vec::new(),
+            known_libraries: HashSet::new(),
             names: HashMap::new(),
             groups: Vec::new(),
             group: None,
@@ -272,7 +274,7 @@ impl<'a> Reader<'a> {
             }
             b"mtllib" => {
                 let name = String::from_utf8_lossy(rest).into_owned();
-                if !name.is_empty() && !self.libraries.contains(&name) {
+                if !name.is_empty() && self.known_libraries.insert(name.clone()) {
                     self.libraries.push(name);
                 }
             }
@@ -317,6 +319,11 @@ impl<'a> Reader<'a> {
         if words.len() < 3 {
             self.notes.add("faces of fewer than 3 corners are left out", format!("line {line}"));
             return Ok(());
+        }
+        if words.len() > MOST_CORNERS {
+            let message =
+                format!("faces of more than {MOST_CORNERS} corners are right only where they are convex");
+            self.notes.add(message, format!("line {line}"));
         }
         self.faces.push('f');
         let first = self.without_uv.len();

@@ -24,7 +24,7 @@ use super::usd_materials::Looks;
 use super::usda::{self, Layer, Prim, Value};
 use crate::error::ImportError;
 use crate::notes::Notes;
-use crate::poly::{Corner, PolyMesh, Shape, build_head};
+use crate::poly::{Corner, MOST_CORNERS, PolyMesh, Shape, build_head};
 use crate::usdz;
 
 /// Reads a layer, or a package whose first file is one.
@@ -254,6 +254,11 @@ impl Reader<'_> {
                 .map(|c| Corner { point: first + corners[c] as u32, uv: uv_of[c] })
                 .collect();
             next += count;
+            if *count > MOST_CORNERS {
+                let message =
+                    format!("faces of more than {MOST_CORNERS} corners are right only where they are convex");
+                self.notes.add(message, prim.path.as_str());
+            }
             if *count < 3 {
                 continue;
             }

@@ -118,7 +118,7 @@ fn mesh(name: &str) -> String {
 
 fn usd(name: &str, text: impl FnOnce() -> String + 'static) -> Case {
     let file = "a.usda";
-    Case::new(format!("usd/{name}"), &["import", "{}/a.usda", "-o", "{}/b.glb"], move |f| {
+    Case::new(format!("usd/{name}"), &["import", "{}/a.usda", "--maps", "0", "-o", "{}/b.glb"], move |f| {
         write(f, file, format!("{USD}{}", text()).as_bytes());
     })
 }
