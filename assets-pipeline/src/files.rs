@@ -1,6 +1,7 @@
 //! Names and files: names that a file gives, as names of files; files that appear only when they are complete.
 
 use std::collections::HashSet;
+use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
@@ -55,20 +56,75 @@ fn is_foreign(c: char) -> bool {
     matches!(c, '/' | '\\' | ':') || c.is_control()
 }
 
-/// Writes a file beside its place under a name that nobody can guess, then renames it; a failure leaves nothing behind
-/// and an older file as it was.
-pub(crate) fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+/// How the names of unfinished files begin. Nobody can guess the rest, so that no link waits under it.
+const UNFINISHED: &str = ".rubor-";
+/// Where locks do not tell, an unfinished file of this age is nobody's.
+const ABANDONED: std::time::Duration = std::time::Duration::from_secs(24 * 3600);
+/// What the name of an unfinished file has before its extension.
+const PART: &str = ".part";
+
+/// Writes a file: all of it, or nothing (see [`replace_with`]). What killed runs left in the folder is removed first.
+///
+/// # Errors
+/// The system refuses.
+pub fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    remove_unfinished(folder_of(path));
+    replace_with(path, |file, _| file.write_all(bytes))
+}
+
+/// Lets `make` fill a new file beside the place of `path`, by its handle or its name, and then renames it; a failure
+/// leaves nothing behind and an older file as it was. The unfinished file has the same extension, for programs that
+/// choose a format by it, and is locked while it is made.
+///
+/// # Errors
+/// The system refuses, or `make` fails.
+pub fn replace_with(
+    path: &Path,
+    make: impl FnOnce(&mut File, &Path) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let mut suffix = std::ffi::OsString::from(PART);
+    if let Some(extension) = path.extension() {
+        suffix.push(".");
+        suffix.push(extension);
+    }
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".").suffix(".part");
+    builder.prefix(UNFINISHED).suffix(&suffix);
     // Temporary files are private by default; this one becomes a file like any other, less the user's mask.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut part = builder.tempfile_in(folder)?;
-    part.write_all(bytes)?;
+    let mut part = builder.tempfile_in(folder_of(path))?;
+    // Some file systems have no locks; there, what is being made counts as left over. Locks of Windows would also stop
+    // `make` from writing by the name.
+    #[cfg(unix)]
+    let _ = part.as_file().try_lock();
+    let name = part.path().to_owned();
+    make(part.as_file_mut(), &name)?;
     part.as_file().sync_all()?;
     part.persist(path).map_err(|e| e.error)?;
     Ok(())
+}
+
+/// Removes unfinished files that killed runs left in a folder; those of running ones are locked. Returns how many.
+pub fn remove_unfinished(folder: &Path) -> usize {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let is_left = |path: &Path| {
+        // A link, a pipe or a folder of such a name is not ours.
+        let Some(metadata) = path.symlink_metadata().ok().filter(std::fs::Metadata::is_file) else {
+            return false;
+        };
+        if cfg!(unix) {
+            File::open(path).is_ok_and(|file| file.try_lock().is_ok())
+        } else {
+            metadata.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED))
+        }
+    };
+    let is_unfinished = |name: &str| name.starts_with(UNFINISHED) && name.contains(PART);
+    let unfinished = entries.filter(|e| e.file_name().to_str().is_some_and(is_unfinished));
+    unfinished.map(|e| e.path()).filter(|p| is_left(p) && std::fs::remove_file(p).is_ok()).count()
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 #[cfg(test)]
@@ -132,7 +188,31 @@ mod tests {
         std::fs::write(folder.path().join("taken/inside"), b"").unwrap();
         assert!(replace(&folder.path().join("taken"), b"three").is_err());
         let names = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name());
-        assert!(names.into_iter().all(|n| !n.to_string_lossy().ends_with(".part")));
+        assert!(names.into_iter().all(|n| !n.to_string_lossy().contains(PART)));
         assert!(replace(&folder.path().join("none/a.txt"), b"four").is_err());
+    }
+    #[test]
+    fn leftovers_of_killed_runs_go_and_those_of_running_ones_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("a.png");
+        let left = folder.path().join(".rubor-killed.part.png");
+        std::fs::write(&left, b"half").unwrap();
+        std::fs::write(folder.path().join(".rubor-lock"), b"").unwrap();
+        replace_with(&file, |part, name| {
+            assert_eq!(name.extension(), file.extension());
+            assert_eq!(remove_unfinished(folder.path()), 1);
+            assert!(!left.exists() && name.exists(), "the lock of the running one holds");
+            part.write_all(b"whole")
+        })
+        .unwrap();
+        assert_eq!(std::fs::read(&file).unwrap(), b"whole");
+        #[cfg(unix)]
+        {
+            let victim = folder.path().join("victim");
+            std::fs::write(&victim, b"kept").unwrap();
+            std::os::unix::fs::symlink(&victim, &left).unwrap();
+            assert_eq!(remove_unfinished(folder.path()), 0, "a link is not ours");
+            assert_eq!(std::fs::read(&victim).unwrap(), b"kept");
+        }
     }
 }

@@ -236,6 +236,11 @@ pub fn shared_texels(skin: &Skin<'_>, side: u32) -> f64 {
     const FARTHEST_TILE: f64 = 64.0;
     // Texels inside of a triangle, and not on its edges.
     const INSIDE: f64 = 1e-3;
+    // Texels that are tried, and tiles that are kept: layouts that need more cover the square a thousand times, and the
+    // triangles before tell it.
+    const MOST_TRIES: usize = 1 << 28;
+    const MOST_TILES: usize = 1024;
+    let mut tries = 0;
     let mut tiles: HashMap<(i32, i32), Vec<u8>> = HashMap::new();
     for t in 0..skin.triangles.len() {
         let [a, b, c] = [0, 1, 2].map(|k| skin.uv(t, k) * f64::from(side));
@@ -249,6 +254,11 @@ pub fn shared_texels(skin: &Skin<'_>, side: u32) -> f64 {
             || (high - low).max_element() > 2.0 * f64::from(side)
         {
             continue;
+        }
+        let size = high - low + 1.0;
+        tries += (size.x * size.y) as usize;
+        if tries > MOST_TRIES || tiles.len() > MOST_TILES {
+            break;
         }
         for y in low.y as i32..=high.y as i32 {
             for x in low.x as i32..=high.x as i32 {

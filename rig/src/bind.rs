@@ -17,7 +17,8 @@
 //! than one together (in proportion, nothing left for the neutral), and that global scales add their differences from 1,
 //! so that the order of expressions does not matter and half an expression has half its effect.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::Arc;
 
 use crate::error::{Note, RigError};
 use crate::expression::{CombinationMode, Rig};
@@ -67,6 +68,9 @@ impl Limits {
 pub struct BoundRig {
     expressions: Vec<(String, Effect)>,
     states: Vec<(String, Effect)>,
+    /// Indices by name.
+    expression_of_name: HashMap<String, usize>,
+    state_of_name: HashMap<String, usize>,
     combinations: Vec<BoundCombination>,
     inbetweens: Vec<Inbetweens>,
     shape_count: usize,
@@ -141,7 +145,12 @@ impl BoundRig {
         }
         let combinations = binder.combinations(rig)?;
         let inbetweens = binder.inbetweens(rig)?;
+        let by_name = |list: &[(String, Effect)]| {
+            list.iter().enumerate().map(|(i, (name, _))| (name.clone(), i)).collect()
+        };
         let bound = Self {
+            expression_of_name: by_name(&expressions),
+            state_of_name: by_name(&states),
             expressions,
             states,
             combinations,
@@ -165,12 +174,12 @@ impl BoundRig {
 
     /// Index of an expression in [`Weights::expressions`].
     pub fn expression_index(&self, name: &str) -> Option<usize> {
-        self.expression_names().position(|n| n == name)
+        self.expression_of_name.get(name).copied()
     }
 
     /// Index of a state in [`Weights::states`].
     pub fn state_index(&self, name: &str) -> Option<usize> {
-        self.state_names().position(|n| n == name)
+        self.state_of_name.get(name).copied()
     }
 
     /// Weights of the neutral face.
@@ -184,13 +193,28 @@ impl BoundRig {
 
     /// The face at these weights; the head itself does not move. Missing weights count as 0.
     pub fn face(&self, weights: &Weights) -> FaceState {
+        let expressions = self.expressions.iter().zip(&weights.expressions);
+        let states = self.states.iter().zip(&weights.states);
+        let effects = expressions.chain(states).map(|((_, effect), weight)| (effect, *weight));
+        self.face_of(effects, &weights.shapes)
+    }
+
+    /// The face with one expression at 1 and nothing else, at a cost that does not grow with the number of expressions.
+    pub fn face_of_expression(&self, index: usize) -> FaceState {
+        self.face_of(self.expressions.get(index).map(|(_, effect)| (effect, 1.0)).into_iter(), &[])
+    }
+
+    /// As [`BoundRig::face_of_expression`], of a state.
+    pub fn face_of_state(&self, index: usize) -> FaceState {
+        self.face_of(self.states.get(index).map(|(_, effect)| (effect, 1.0)).into_iter(), &[])
+    }
+
+    fn face_of<'a>(&self, effects: impl Iterator<Item = (&'a Effect, f32)>, authored: &[f32]) -> FaceState {
         let mut shapes = vec![0.0; self.shape_count];
         let mut zones = vec![0.0; self.zone_count];
         let mut distributions = vec![0.0; self.distribution_count];
         let mut scale = 1.0;
-        let expressions = self.expressions.iter().zip(&weights.expressions);
-        let states = self.states.iter().zip(&weights.states);
-        for ((_, effect), &weight) in expressions.chain(states) {
+        for (effect, weight) in effects {
             if weight == 0.0 {
                 continue;
             }
@@ -200,11 +224,11 @@ impl BoundRig {
             scale += weight * effect.scale_change;
         }
         let mut limits = vec![Limits::default(); self.shape_count];
-        for (limits, direct) in limits.iter_mut().zip(&weights.shapes) {
+        for (limits, direct) in limits.iter_mut().zip(authored) {
             limits.include(*direct);
         }
-        for ((sum, direct), limits) in shapes.iter_mut().zip(&weights.shapes).zip(&limits) {
-            *sum = limits.hold(*sum + direct);
+        for (i, (sum, limits)) in shapes.iter_mut().zip(&limits).enumerate() {
+            *sum = limits.hold(*sum + authored.get(i).copied().unwrap_or_default());
         }
         for combination in &self.combinations {
             let drivers = combination.drivers.iter().map(|d| shapes[*d as usize].clamp(0.0, 1.0));
@@ -281,8 +305,8 @@ pub(crate) struct Binder<'a> {
     pub(crate) notes: Vec<Note>,
     source: &'a Source,
     shapes: Resolver,
-    zones: Resolver,
-    distributions: Resolver,
+    zones: Arc<Resolver>,
+    distributions: Arc<Resolver>,
     noted: BTreeSet<(&'static str, String)>,
 }
 
@@ -292,8 +316,8 @@ impl<'a> Binder<'a> {
             notes: Vec::new(),
             source,
             shapes: Resolver::shapes(head),
-            zones: Resolver::zones(head),
-            distributions: Resolver::distributions(head),
+            zones: Arc::new(Resolver::zones(head)),
+            distributions: Arc::new(Resolver::distributions(head)),
             noted: BTreeSet::new(),
         }
     }

@@ -12,7 +12,7 @@
 //! assert_eq!(wrong.nearest.as_deref(), Some("expressions"));
 //! ```
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use schemars::JsonSchema;
@@ -211,17 +211,19 @@ impl Rig {
             }
         }
         for (i, combination) in self.combinations.iter().enumerate() {
+            let mut before = HashSet::new();
             if combination.drivers.is_empty() {
                 return self.wrong(&steps!["combinations", i, "drivers"], "no driver", "at least one driver");
             }
             for (j, driver) in combination.drivers.iter().enumerate() {
-                if *driver == combination.shape || combination.drivers[..j].contains(driver) {
+                if *driver == combination.shape || !before.insert(driver.as_str()) {
                     let found = format!("{driver:?} again");
                     let expected = "drivers that differ from each other and from the shape they drive";
                     return self.wrong(&steps!["combinations", i, "drivers", j], &found, expected);
                 }
             }
         }
+        let mut before = HashSet::new();
         for (i, inbetween) in self.inbetweens.iter().enumerate() {
             if !(inbetween.weight > 0.0 && inbetween.weight < 1.0) {
                 let found = inbetween.weight.to_string();
@@ -231,8 +233,7 @@ impl Rig {
                 let found = format!("{:?} as its own in-between", inbetween.target);
                 return self.wrong(&steps!["inbetweens", i, "target"], &found, "another shape");
             }
-            let same = |other: &Inbetween| other.shape == inbetween.shape && other.weight == inbetween.weight;
-            if self.inbetweens[..i].iter().any(same) {
+            if !before.insert((inbetween.shape.as_str(), inbetween.weight.to_bits())) {
                 let found = format!("a second in-between of {:?} at {}", inbetween.shape, inbetween.weight);
                 return self.wrong(&steps!["inbetweens", i, "weight"], &found, "different weights");
             }

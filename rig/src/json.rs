@@ -11,8 +11,9 @@
 //!
 //! Ranges are checked where values are bound, not by a derive (`garde`), which has no place in the text.
 
+use std::collections::HashMap;
 use std::fmt::Display;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use jsonc_parser::ast::{ObjectPropName, Value};
 use jsonc_parser::common::Ranged;
@@ -23,6 +24,7 @@ use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, Visit
 use serde::forward_to_deserialize_any;
 
 use crate::error::{Place, RigError};
+use crate::limits;
 use crate::names::nearest;
 
 /// Where a value was read from, kept with the value so that later messages can name the place.
@@ -31,6 +33,8 @@ use crate::names::nearest;
 pub struct Source {
     file: Arc<str>,
     text: Arc<str>,
+    /// Made for the first message: a file may earn a hundred thousand.
+    places: Arc<OnceLock<Places>>,
 }
 
 impl PartialEq for Source {
@@ -40,7 +44,7 @@ impl PartialEq for Source {
 }
 
 /// One step from a JSON value to a value inside it.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Step {
     /// The member of an object.
     Key(String),
@@ -75,7 +79,7 @@ pub(crate) use steps;
 impl Source {
     /// Text of a file under the name that messages give it.
     pub fn new(file: &str, text: &str) -> Self {
-        Self { file: file.into(), text: text.into() }
+        Self { file: file.into(), text: text.into(), places: Arc::default() }
     }
 
     /// Name of the file as messages give it; empty for values that were made by a program.
@@ -94,28 +98,105 @@ impl Source {
     }
 
     fn place(&self, path: &[Step], at_key: bool) -> Place {
-        let nowhere = || Place { file: self.file.to_string(), line: 0, column: 0 };
-        let Ok(Some(root)) = parse(&self.text) else { return nowhere() };
-        let mut value = &root;
-        let mut start = value.range().start;
-        for (depth, step) in path.iter().enumerate() {
-            let next = match (step, value) {
-                (Step::Key(key), Value::Object(object)) => object
-                    .properties
-                    .iter()
-                    .find(|p| p.name.as_str() == key)
-                    .map(|p| (&p.value, p.name.range().start)),
-                (Step::Index(index), Value::Array(array)) => {
-                    array.elements.get(*index).map(|element| (element, element.range().start))
-                }
-                _ => None,
-            };
-            let Some((inner, key_start)) = next else { break };
-            value = inner;
-            start = if at_key && depth + 1 == path.len() { key_start } else { inner.range().start };
-        }
-        place_of_offset(&self.file, &self.text, start)
+        let places = self.places.get_or_init(|| Places::new(&self.text));
+        let Some(offset) = places.offset(path, at_key) else {
+            return Place { file: self.file.to_string(), line: 0, column: 0 };
+        };
+        let (line, column) = places.lines.of(&self.text, offset);
+        Place { file: self.file.to_string(), line, column }
     }
+}
+
+/// Offsets of all values of a text.
+#[derive(Debug, Default)]
+struct Places {
+    /// Key and value of each, by the value around it; empty where the text does not parse.
+    starts: Vec<[usize; 2]>,
+    by_step: HashMap<(usize, Step), usize>,
+    lines: Lines,
+}
+
+impl Places {
+    fn new(text: &str) -> Self {
+        let mut places = Self { lines: Lines::new(text), ..Self::default() };
+        let Ok(Some(root)) = parse(text) else { return places };
+        places.starts.push([root.range().start; 2]);
+        let mut open = vec![(&root, 0)];
+        while let Some((value, around)) = open.pop() {
+            let mut add = |step: Step, key: usize, inner| {
+                let number = places.starts.len();
+                places.starts.push([key, Ranged::range(inner).start]);
+                // The first of several equal keys, as a reader refuses the others.
+                places.by_step.entry((around, step)).or_insert(number);
+                open.push((inner, number));
+            };
+            match value {
+                Value::Object(object) => {
+                    for p in &object.properties {
+                        add(Step::Key(p.name.as_str().to_owned()), p.name.range().start, &p.value);
+                    }
+                }
+                Value::Array(array) => {
+                    for (i, element) in array.elements.iter().enumerate() {
+                        add(Step::Index(i), element.range().start, element);
+                    }
+                }
+                _ => {}
+            }
+        }
+        places
+    }
+
+    /// Where a value, or its key, starts; else the last value on the path that exists.
+    fn offset(&self, path: &[Step], at_key: bool) -> Option<usize> {
+        let mut value = 0;
+        let mut reached = 0;
+        for step in path {
+            let Some(inner) = self.by_step.get(&(value, step.clone())) else { break };
+            value = *inner;
+            reached += 1;
+        }
+        let [key, start] = *self.starts.get(value)?;
+        Some(if at_key && reached == path.len() { key } else { start })
+    }
+}
+
+/// Starts of the lines of a text, and characters before every [`Lines::STEP`] bytes, for columns of long lines.
+#[derive(Debug, Default)]
+struct Lines {
+    starts: Vec<usize>,
+    characters: Vec<usize>,
+}
+
+impl Lines {
+    const STEP: usize = 1024;
+
+    fn new(text: &str) -> Self {
+        let ends = text.bytes().enumerate().filter(|(_, b)| *b == b'\n');
+        let starts = std::iter::once(0).chain(ends.map(|(i, _)| i + 1)).collect();
+        let mut characters = vec![0];
+        let mut count = 0;
+        for chunk in text.as_bytes().chunks(Self::STEP) {
+            count += characters_of(chunk);
+            characters.push(count);
+        }
+        Self { starts, characters }
+    }
+
+    /// Line and column of an offset, from 1.
+    fn of(&self, text: &str, offset: usize) -> (usize, usize) {
+        let line = self.starts.partition_point(|start| *start <= offset).max(1);
+        let before = |at: usize| {
+            let step = at / Self::STEP;
+            self.characters[step] + characters_of(&text.as_bytes()[step * Self::STEP..at])
+        };
+        (line, before(offset) - before(self.starts[line - 1]) + 1)
+    }
+}
+
+/// Characters that begin in these bytes of UTF-8.
+fn characters_of(bytes: &[u8]) -> usize {
+    bytes.iter().filter(|b| **b & 0xc0 != 0x80).count()
 }
 
 /// Reads a value.
@@ -125,6 +206,11 @@ impl Source {
 pub fn from_str<T: DeserializeOwned>(file: &str, text: &str) -> Result<(T, Source), RigError> {
     // Columns are counted without the byte order mark, which editors do not show.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    // The tree, and what is made of it.
+    if let Err((found, expected)) = limits::check_values(text.as_bytes(), 2) {
+        let place = Place { file: file.to_owned(), line: 0, column: 0 };
+        return Err(RigError { place, found, expected, nearest: None });
+    }
     let root = match parse(text) {
         Ok(Some(root)) => root,
         Ok(None) => {
@@ -153,7 +239,7 @@ pub fn from_str<T: DeserializeOwned>(file: &str, text: &str) -> Result<(T, Sourc
 /// # Errors
 /// A file that cannot be read, or that is not UTF-8.
 pub fn read_text(path: &std::path::Path) -> Result<String, RigError> {
-    std::fs::read_to_string(path).map_err(|error| RigError {
+    limits::read_to_string(path).map_err(|error| RigError {
         place: Place { file: path.display().to_string(), line: 0, column: 0 },
         found: error.to_string(),
         expected: "a readable text file".into(),
@@ -286,9 +372,16 @@ impl NodeError {
     }
 }
 
-/// `"a", "b", "c"`.
+/// `"a", "b", "c"`, of many the first.
 pub(crate) fn quoted_list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
-    names.into_iter().map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ")
+    const SHOWN: usize = 64;
+    let mut names = names.into_iter();
+    let mut shown: Vec<String> = names.by_ref().take(SHOWN).map(|n| format!("{n:?}")).collect();
+    match names.count() {
+        0 => {}
+        more => shown.push(format!("{more} more")),
+    }
+    shown.join(", ")
 }
 
 impl Display for NodeError {

@@ -36,6 +36,7 @@ pub mod json;
 pub mod landmarks;
 pub mod life;
 pub mod lights;
+pub mod limits;
 pub mod map;
 pub mod mask;
 pub mod names;

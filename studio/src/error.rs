@@ -1,7 +1,8 @@
 //! Errors of the studio: one message, an optional hint, and the kind of fault.
 //!
 //! One rule decides the exit code of the command: 0 done, 1 the job failed (a file that cannot be written, a lost
-//! device, a result that is not good enough), 2 the input or the arguments are wrong.
+//! device, a result that is not good enough), 2 the input or the arguments are wrong, 128 + n stopped by signal n (130
+//! for Ctrl-C), as shells have it.
 //!
 //! The command prints the message and the hint as they are. `miette` would break long paths over lines, which then cannot
 //! be searched for, and adds nothing: messages already name file, line, column, what was found and what was expected.
@@ -22,6 +23,8 @@ pub enum Fault {
     Job,
     /// The reader of the output has closed the pipe. This is not an error; the command stops.
     ClosedPipe,
+    /// A signal asked to stop.
+    Stopped(u8),
 }
 
 /// A failure, with its message and hint.
@@ -62,6 +65,18 @@ impl Failure {
         Self { fault: Fault::ClosedPipe, message: "the output was closed".into(), hint: None }
     }
 
+    /// A signal asked to stop.
+    pub fn stopped(signal: u8) -> Self {
+        Self { fault: Fault::Stopped(signal), message: "stopped".into(), hint: None }
+    }
+
+    /// The same failure with something said before its message.
+    #[must_use]
+    pub fn context(mut self, before: impl Display) -> Self {
+        self.message = format!("{before}: {}", self.message);
+        self
+    }
+
     /// Adds a hint.
     #[must_use]
     pub fn hint(mut self, hint: impl Display) -> Self {
@@ -80,6 +95,7 @@ impl Failure {
             Fault::ClosedPipe => 0,
             Fault::Job => 1,
             Fault::Input => 2,
+            Fault::Stopped(signal) => signal.saturating_add(128),
         }
     }
 }

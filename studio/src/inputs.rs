@@ -7,6 +7,7 @@ use rubor_assets::{check, import, synthesize};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_rig::lights::{LIGHT_RIGS, light_rig};
+use rubor_rig::limits;
 use rubor_rig::timeline::Sequence;
 
 use crate::environment;
@@ -71,7 +72,7 @@ pub fn plain_head(path: Option<&Path>) -> Outcome<LoadedHead> {
         None => std::borrow::Cow::Borrowed(DEFAULT_HEAD),
         Some(path) => {
             require_file(path, "a head (.glb, .gltf, .vrm, .obj, .usda or .usdz)")?;
-            std::fs::read(path).map_err(|e| Failure::read(path, e))?.into()
+            limits::read(path).map_err(|e| Failure::read(path, e))?.into()
         }
     };
     let imported = import::file::from_bytes(&bytes, name)?;

@@ -12,6 +12,7 @@ use std::str::FromStr;
 use rubor_renderer::settings::{Preset, Settings};
 use rubor_rig::expression::Rig;
 use rubor_rig::json;
+use rubor_rig::limits;
 use rubor_rig::timeline::{Environment, Light, Sequence};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -219,6 +220,16 @@ impl Job {
         Ok(text + "\n")
     }
 
+    /// Fills in the fingerprints of heads and environment as they are now, so that a change of a file is noticed when the
+    /// job is resumed or drawn again. `heads` are those that [`Job::load_heads`] gave, or that it was made of.
+    ///
+    /// # Errors
+    /// The environment is a file that cannot be read.
+    pub fn seal(&mut self, heads: &[LoadedHead]) -> Outcome {
+        self.heads = heads.iter().map(|h| h.source.clone()).collect();
+        self.note_environment()
+    }
+
     /// Writes the job file.
     ///
     /// # Errors
@@ -241,7 +252,7 @@ impl Job {
             heads.push(loaded);
         }
         if let Some(InputFile { file: Some(path), .. }) = &self.environment {
-            let bytes = std::fs::read(path).map_err(|e| Failure::read(path, e))?;
+            let bytes = limits::read(path).map_err(|e| Failure::read(path, e))?;
             self.environment.iter().try_for_each(|input| input.check(&Fingerprint::of(&bytes)))?;
         }
         Ok(heads)
@@ -271,7 +282,7 @@ impl Job {
         let path = inputs::absolute(Path::new(&name))?;
         // A missing file is refused when it is loaded, with the names of those built in.
         if path.is_file() {
-            let bytes = std::fs::read(&path).map_err(|e| Failure::read(&path, e))?;
+            let bytes = limits::read(&path).map_err(|e| Failure::read(&path, e))?;
             self.environment = Some(InputFile { file: Some(path), fingerprint: Fingerprint::of(&bytes) });
         }
         Ok(())
@@ -312,8 +323,8 @@ impl FrameList {
     }
 }
 
-/// Longest run of frames in a list.
-const MOST_FRAMES: u32 = 1_000_000;
+/// Most frames of a list and of a run: more than a day at 100 frames a second.
+pub const MOST_FRAMES: u32 = 10_000_000;
 
 impl FromStr for FrameList {
     type Err = String;
@@ -325,8 +336,11 @@ impl FromStr for FrameList {
             let (first, last) = part.split_once('-').unwrap_or((part, part));
             let first: u32 = first.trim().parse().map_err(|_| wrong())?;
             let last: u32 = last.trim().parse().map_err(|_| wrong())?;
-            if first == 0 || last < first || last - first > MOST_FRAMES {
+            if first == 0 || last < first {
                 return Err(wrong());
+            }
+            if numbers.len() as u64 + u64::from(last - first) >= u64::from(MOST_FRAMES) {
+                return Err(format!("found more than {MOST_FRAMES} frames, expected fewer in one list"));
             }
             numbers.extend(first..=last);
         }

@@ -40,8 +40,10 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::exit)]
 
+mod claim;
 pub mod environment;
 pub mod error;
+pub mod farm;
 pub mod gallery;
 pub mod inputs;
 pub mod job;
@@ -52,6 +54,7 @@ pub mod plan;
 pub mod report;
 pub mod review;
 pub mod run;
+pub mod stop;
 pub mod studio;
 pub mod walks;
 pub mod watch;
@@ -62,5 +65,6 @@ pub use job::Job;
 pub use plan::Plan;
 pub use report::Report;
 pub use run::Destination;
+pub use stop::Stop;
 pub use studio::Studio;
 pub use watch::Watch;

@@ -7,6 +7,7 @@
 //! assert_eq!(lines, [r#"head "Ada": the head has no shape "jawOpen" and "tongueOut": it has no effect"#]);
 //! ```
 
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 /// One note.
@@ -51,32 +52,28 @@ impl fmt::Display for Note {
 
 /// One line per kind: notes on the same file or head whose messages differ only in the first quoted name.
 pub fn summed(notes: &[Note]) -> Vec<String> {
-    let parts: Vec<(&str, &str, &str)> = notes.iter().map(|n| split_name(&n.message)).collect();
-    let is_like = |a: usize, b: usize| {
-        let ((before_a, name_a, after_a), (before_b, name_b, after_b)) = (parts[a], parts[b]);
-        let same_place = notes[a].place == notes[b].place || !name_a.is_empty();
-        notes[a].about == notes[b].about
-            && same_place
-            && before_a == before_b
-            && after_a == after_b
-            && name_a.is_empty() == name_b.is_empty()
-    };
-    let mut lines = Vec::new();
-    for first in 0..notes.len() {
-        if (0..first).any(|earlier| is_like(earlier, first)) {
-            continue;
+    type Kind<'a> = (&'a str, &'a str, &'a str, bool, &'a str);
+    let mut kinds: Vec<(&Note, Vec<&str>)> = Vec::new();
+    let mut number_of: HashMap<Kind<'_>, usize> = HashMap::new();
+    let mut known: HashSet<(usize, &str)> = HashSet::new();
+    for note in notes {
+        let (before, name, after) = split_name(&note.message);
+        let place = if name.is_empty() { note.place.as_str() } else { "" };
+        let kind = (note.about.as_str(), before, after, name.is_empty(), place);
+        let number = *number_of.entry(kind).or_insert_with(|| {
+            kinds.push((note, Vec::new()));
+            kinds.len() - 1
+        });
+        if known.insert((number, name)) {
+            kinds[number].1.push(name);
         }
-        let mut names: Vec<&str> = Vec::new();
-        for other in (first..notes.len()).filter(|other| is_like(first, *other)) {
-            if !names.contains(&parts[other].1) {
-                names.push(parts[other].1);
-            }
-        }
-        let (before, _, after) = parts[first];
-        let message = format!("{before}{}{after}", listed(&names));
-        lines.push(Note { message, ..notes[first].clone() }.to_string());
     }
-    lines
+    let line = |(first, names): (&Note, Vec<&str>)| {
+        let (before, _, after) = split_name(&first.message);
+        let message = format!("{before}{}{after}", listed(&names));
+        Note { message, ..first.clone() }.to_string()
+    };
+    kinds.into_iter().map(line).collect()
 }
 
 /// `"a"`, `"a" and "b"`, `"a", "b", "c" and 25 more (28 in all)`.

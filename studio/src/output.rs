@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use rubor_assets::files;
 use rubor_assets::image_io::{ImageError, SampleKind};
 use rubor_renderer::channels::{Channel, ChannelData};
 use rubor_rig::map::Map;
@@ -17,12 +18,12 @@ pub fn folder(path: &Path) -> Outcome {
     std::fs::create_dir_all(path).map_err(|e| Failure::write(path, e))
 }
 
-/// Writes a file: all of it, or nothing.
+/// Writes a file: all of it, or nothing. What killed runs left in its folder goes.
 ///
 /// # Errors
 /// The system reports an error.
 pub fn write(path: &Path, bytes: &[u8]) -> Outcome {
-    commit(path, |partial| std::fs::write(partial, bytes))
+    files::replace(path, bytes).map_err(|e| Failure::write(path, e))
 }
 
 /// Writes a value as JSON that people can read.
@@ -35,26 +36,12 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Outcome {
     write(path, &text)
 }
 
-/// Lets `make` fill a file of a temporary name in the same folder and then renames it. The temporary name has the
-/// same extension, for programs that choose a format by it.
+/// Lets `make` fill a file of a temporary name in the same folder and then renames it (see [`files::replace_with`]).
 ///
 /// # Errors
 /// The system reports an error, or `make` fails; no file remains.
 pub fn commit(path: &Path, make: impl FnOnce(&Path) -> std::io::Result<()>) -> Outcome {
-    let failed = |e: std::io::Error| Failure::write(path, e);
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let suffix = path.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".partial-").suffix(&suffix);
-    // Temporary files are readable by their owner only; a result gets the permissions of any other file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let partial = builder.tempfile_in(folder).map_err(failed)?.into_temp_path();
-    make(&partial).map_err(failed)?;
-    partial.persist(path).map_err(|e| failed(e.error))
+    files::replace_with(path, |_, partial| make(partial)).map_err(|e| Failure::write(path, e))
 }
 
 /// Writes a picture; its name decides the format.
@@ -83,7 +70,8 @@ pub fn save_map(path: &Path, map: &Map, kind: SampleKind) -> Outcome {
 /// The system reports an error.
 pub fn save_channel(path: &Path, data: &ChannelData) -> Outcome {
     use exr::prelude::{
-        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
+        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder,
+        WritableImage,
     };
     let names = data.channel.row().components;
     let samples = |c: usize| {
@@ -97,7 +85,8 @@ pub fn save_channel(path: &Path, data: &ChannelData) -> Outcome {
     let layer = Layer::new(
         (data.size[0] as usize, data.size[1] as usize),
         LayerAttributes::named(data.channel.name().as_str()),
-        Encoding::FAST_LOSSLESS,
+        // Blocks in a fixed order: equal values give equal bytes, however many threads compress them.
+        Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS },
         AnyChannels::sort(channels),
     );
     let image = Image::from_layer(layer);

@@ -14,7 +14,7 @@ use rubor_rig::head::Head;
 
 use crate::error::{Failure, Outcome};
 use crate::inputs::LoadedHead;
-use crate::job::Job;
+use crate::job::{Job, MOST_FRAMES};
 use crate::notes::Note;
 use crate::studio::{Frame, Studio};
 
@@ -51,6 +51,11 @@ impl<'a> Plan<'a> {
         }
         let Some(first) = evaluators.first() else { return Err(Failure::input("there is no head to draw")) };
         let count = first.frame_count();
+        let listed = job.frames.as_ref().map_or(count, |list| list.numbers().len() as u32);
+        if listed > MOST_FRAMES {
+            let expected = format!("at most {MOST_FRAMES}: fewer frames per second, or a list of frames");
+            return Err(Failure::input(format!("frames: found {listed}, expected {expected}")));
+        }
         let frames = match &job.frames {
             None => (0..count).collect(),
             Some(list) => {

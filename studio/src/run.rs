@@ -6,23 +6,24 @@
 //! heads --------> animated_head.glb      job.json, stats.json
 //! ```
 
-use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use image::RgbImage;
-use rubor_assets::export;
+use rubor_assets::{export, files};
 use rubor_renderer::footprint;
 
-use crate::error::{Failure, Outcome};
-use crate::job::{FrameList, Job};
+use crate::claim::Claim;
+use crate::error::{Failure, Fault, Outcome};
+use crate::job::Job;
 use crate::notes::{Note, summed};
 use crate::output;
 use crate::plan::{Plan, Shown};
 use crate::report::{JobReport, PassTimes, Report, median};
 use crate::review::inset::Inset;
 use crate::review::{contact_sheet, video};
+use crate::stop::Stop;
 use crate::studio::{Frame, Studio};
 use crate::watch::Watch;
 use crate::writers;
@@ -45,16 +46,21 @@ pub struct Destination {
     pub folder: PathBuf,
     /// Keep the frames that a stopped run of the same job left.
     pub resume: bool,
+    /// Folder of folders with frames of the same job, which are taken before others are drawn; only with `resume`.
+    pub chunks: Option<PathBuf>,
     /// Make a video, if the job has all frames.
     pub video: bool,
     /// Write the first head with its performance.
     pub animated_head: bool,
+    /// Asks the run to stop after the frame at hand.
+    pub stop: Stop,
 }
 
 impl Destination {
     /// Everything into a folder, all of it new.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
-        Self { folder: folder.into(), resume: false, video: true, animated_head: true }
+        let stop = Stop::default();
+        Self { folder: folder.into(), resume: false, chunks: None, video: true, animated_head: true, stop }
     }
 }
 
@@ -73,7 +79,8 @@ struct Written {
 /// Draws a plan into a folder.
 ///
 /// # Errors
-/// The folder holds the frames of another job; errors of the studio; files that cannot be written.
+/// The folder holds the frames of another job, or another run works in it; errors of the studio; files that cannot be
+/// written; a wish to stop. Where frames are missing then, the message names the first of them.
 pub fn run(
     plan: &Plan<'_>,
     studio: &mut Studio,
@@ -84,21 +91,29 @@ pub fn run(
     watch.notes(plan.notes());
     let (job, heads) = (plan.job(), plan.heads());
     let inset = job.inset.zip(heads.first()).map(|(map, head)| Inset::new(map, &head.head)).transpose()?;
-    let (is_new, mut to_write) = claim(job, to)?;
+    let mut claim = Claim::look(job, &to.folder, to.resume)?;
+    let mut notes = plan.notes().to_vec();
+    if let Some(chunks) = &to.chunks {
+        notes.extend(claim.take()?);
+        gather(job, chunks, &to.folder)?;
+    }
     let size = job.settings.output.size;
     plan.enter(studio)?;
 
     let on_sheet = contact_sheet::choose(plan.frames().len() as u32);
     let mut sheet: BTreeMap<usize, RgbImage> = BTreeMap::new();
     let mut to_draw = Vec::new();
+    let mut done: BTreeSet<usize> = BTreeSet::new();
     watch.begin("frames", plan.frames().len() as u64);
     for (place, frame) in plan.frames().iter().copied().enumerate() {
-        let kept = if is_new { None } else { read_frame(job, &to.folder, frame, size) };
+        let kept =
+            if claim.is_new && to.chunks.is_none() { None } else { read_frame(job, &to.folder, frame, size) };
         match kept {
             Some(picture) => {
                 if on_sheet.contains(&(place as u32)) {
                     sheet.insert(place, contact_sheet::reduce(&picture));
                 }
+                done.insert(place);
                 watch.step();
             }
             None => to_draw.push(frame),
@@ -121,47 +136,53 @@ pub fn run(
         Ok(Written { place, small })
     };
     let mut written = |written: Written| {
+        done.insert(written.place);
         first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
         sheet.extend(written.small.map(|small| (written.place, small)));
         watch.step();
     };
-    // With the first frame, so that a job that cannot be drawn leaves nothing.
-    let mut claim_folder = || -> Outcome {
-        let Some(job) = to_write.take() else { return Ok(()) };
-        output::folder(&to.folder)?;
-        job.write(&to.folder.join(JOB_FILE))
-    };
-    writers::beside(&write, &mut written, |push| {
+    let drawn = writers::beside(&write, &mut written, |push| {
         let mut since = Instant::now();
+        stop_if_asked(&to.stop)?;
         plan.draw(studio, &to_draw, |shown| {
-            claim_folder()?;
+            // With the first frame, so that a job that cannot be drawn leaves nothing.
+            notes.extend(claim.take()?);
             seconds.push(since.elapsed().as_secs_f64());
             since = Instant::now();
             times.add(&shown.drawn.stats);
             let place = plan.frames().partition_point(|f| *f < shown.frame);
-            push(Page { place, shown })
+            push(Page { place, shown })?;
+            stop_if_asked(&to.stop)
         })
-    })?;
-    claim_folder()?;
+    });
+    if let Err(failure) = drawn {
+        watch.end();
+        return Err(with_way_on(failure, plan, &done, &to.folder));
+    }
+    notes.extend(claim.take()?);
     watch.end();
+    watch.notes(&notes[plan.notes().len()..]);
 
     let of_surroundings = studio.take_notes();
     watch.notes(&of_surroundings);
-    let mut notes = plan.notes().to_vec();
     notes.extend(of_surroundings);
     let mut files = vec![PathBuf::from(SHEET_FILE)];
     let small: Vec<RgbImage> = sheet.into_values().collect();
     output::save_picture(&to.folder.join(SHEET_FILE), &contact_sheet::page(&small))?;
+    // A video that fails costs neither the head nor the report.
+    let mut failed = None;
     if to.video && job.frames.is_none() {
-        match video::encode(&to.folder, 1, job.sequence.fps, &to.folder.join(VIDEO_FILE))? {
-            video::Video::Written => files.push(VIDEO_FILE.into()),
-            video::Video::NoEncoder => {
+        match video::encode(&to.folder, plan.frames().len(), job.sequence.fps, VIDEO_FILE) {
+            Ok(video::Video::Written) => files.push(VIDEO_FILE.into()),
+            Ok(video::Video::NoEncoder) => {
                 let message = "no video: the program ffmpeg is not on this machine (Debian, Ubuntu: ffmpeg)";
                 let note = Note::new("", message);
                 watch.notes(std::slice::from_ref(&note));
                 notes.push(note);
             }
+            Err(failure) => failed = Some(failure),
         }
+        stop_if_asked(&to.stop).map_err(|failure| with_way_on(failure, plan, &done, &to.folder))?;
     }
     if to.animated_head {
         export_animated(plan, &to.folder)?;
@@ -185,28 +206,66 @@ pub fn run(
         notes: summed(&notes),
     };
     output::write_json(&to.folder.join(STATS_FILE), &Report::Job(report.clone()))?;
-    Ok(report)
+    match failed {
+        Some(failure) => Err(failure),
+        None => Ok(report),
+    }
 }
 
-/// Whether all frames are new, and the job that the folder has to hold before the first of them. If a stopped run of the
-/// same job is resumed, it holds the frames of both.
-fn claim<'a>(job: &'a Job, to: &Destination) -> Outcome<(bool, Option<Cow<'a, Job>>)> {
-    let path = to.folder.join(JOB_FILE);
-    if !to.resume || !path.is_file() {
-        return Ok((true, Some(Cow::Borrowed(job))));
-    }
-    let before = Job::read(&path, None)?;
-    if !before.draws_like(job)? {
+/// Copies the frames of runs of the same job into the folder, each with its channels before its picture.
+fn gather(job: &Job, chunks: &Path, folder: &Path) -> Outcome {
+    let entries = std::fs::read_dir(chunks).map_err(|e| Failure::read(chunks, e))?;
+    let mut runs: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).collect();
+    runs.retain(|run| run.join(JOB_FILE).is_file());
+    runs.sort();
+    if runs.is_empty() {
+        let expected = "expected folders of runs (`rubor render --frames`)";
         return Err(Failure::input(format!(
-            "{}: found the frames of another job, expected those of this one",
-            to.folder.display()
-        ))
-        .hint("leave out --resume to draw all frames again, or choose another folder"));
+            "{}: found no folder with a {JOB_FILE}, {expected}",
+            chunks.display()
+        )));
     }
-    let both =
-        before.frames.as_ref().zip(job.frames.as_ref()).map(|(a, b): (&FrameList, &FrameList)| a.and(b));
-    let wider = (both != before.frames).then(|| Cow::Owned(Job { frames: both, ..job.clone() }));
-    Ok((false, wider))
+    let copy = |from: PathBuf, to: PathBuf| match rubor_rig::limits::read(&from) {
+        Ok(bytes) => files::replace_with(&to, |file, _| std::io::Write::write_all(file, &bytes))
+            .map_err(|e| Failure::write(&to, e)),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(e) => Err(Failure::read(&from, e)),
+    };
+    for run in runs {
+        let part = Job::read(&run.join(JOB_FILE), None)?;
+        if !part.draws_like(job)? {
+            let found =
+                format!("{}: found the frames of another job, expected those of this one", run.display());
+            return Err(Failure::input(found).hint("draw the chunk again, or take it out of the folder"));
+        }
+        let frames = part.frames.iter().flat_map(|list| list.numbers()).map(|number| number - 1);
+        for frame in frames.filter(|frame| frame_path(&run, *frame).is_file()) {
+            for channel in &job.settings.output.channels {
+                let name = channel.name();
+                copy(channel_path(&run, frame, &name), channel_path(folder, frame, &name))?;
+            }
+            copy(frame_path(&run, frame), frame_path(folder, frame))?;
+        }
+    }
+    Ok(())
+}
+
+fn stop_if_asked(stop: &Stop) -> Outcome {
+    stop.asked().map_or(Ok(()), |signal| Err(Failure::stopped(signal)))
+}
+
+/// A failure of the middle of a run with the frame to go on from.
+fn with_way_on(failure: Failure, plan: &Plan<'_>, done: &BTreeSet<usize>, folder: &Path) -> Failure {
+    if done.is_empty() || failure.fault() == Fault::Input {
+        return failure;
+    }
+    let (count, all) = (done.len(), plan.frames().len());
+    let next = (0..all).find(|place| !done.contains(place)).and_then(|place| plan.frames().get(place));
+    let way = match next {
+        Some(next) => format!("the same command with --resume goes on at frame {}", next + 1),
+        None => "the same command with --resume makes the rest".into(),
+    };
+    failure.context(format!("{count} of {all} frames are in {}", folder.display())).hint(way)
 }
 
 /// The picture of a frame, from 0; files are numbered from 1.

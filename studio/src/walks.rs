@@ -66,7 +66,7 @@ fn name(anisotropy: f64, eta: f64, photons: u64) -> String {
 
 /// A table that is complete and of the right medium; otherwise the walk is repeated.
 fn read(file: &std::path::Path, anisotropy: f64, eta: f64) -> Option<AlbedoTable> {
-    let table: AlbedoTable = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
+    let table: AlbedoTable = serde_json::from_slice(&rubor_rig::limits::read(file).ok()?).ok()?;
     let walk = &table.result().walk;
     (walk.anisotropy == anisotropy && walk.eta == eta).then_some(table)
 }

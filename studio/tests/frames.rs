@@ -1,11 +1,13 @@
 //! Frames do not depend on which others are drawn, in which order, and by how many processes.
 
+use std::collections::BTreeMap;
 use std::io::Write;
+use std::path::Path;
 
 use rubor::inputs::{self, LoadedHead};
 use rubor::job::FrameList;
 use rubor::studio::adapters;
-use rubor::{Destination, Job, Plan, Studio, run};
+use rubor::{Destination, Job, Plan, Stop, Studio, farm, run};
 use rubor_renderer::settings::AntialiasMethod;
 use rubor_rig::timeline::Sequence;
 
@@ -127,4 +129,77 @@ fn parts_and_resumed_runs_make_the_same_files() {
     let names = std::fs::read_dir(folder.path().join("parts")).expect("a folder");
     let names: Vec<_> = names.map(|e| e.expect("a file").file_name()).collect();
     assert!(!names.iter().any(|n| n.to_string_lossy().contains("partial")), "{names:?}");
+}
+
+/// Names and bytes of a folder, but for what was measured.
+fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|e| e.expect("an entry").path());
+    let name = |p: &Path| p.file_name().expect("a name").to_string_lossy().into_owned();
+    let files = entries.filter(|p| p.is_file() && name(p) != "stats.json");
+    files.map(|p| (name(&p), std::fs::read(&p).expect("a file"))).collect()
+}
+
+#[test]
+fn a_folder_has_the_frames_of_its_job_alone_and_chunks_become_one_run() {
+    if !can_draw() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    let heads = [inputs::head(None).expect("the built-in head")];
+    let mut studio = Studio::open(None).expect("a device");
+    let mut run = |job: &Job, to: &Destination| {
+        let plan = Plan::new(job, &heads).expect("a plan");
+        run::run(&plan, &mut studio, to, &mut ())
+    };
+    let to = |name: &str, resume: bool| Destination {
+        resume,
+        video: false,
+        animated_head: false,
+        ..Destination::new(at(name))
+    };
+    let mut long = moving_job(&heads, AntialiasMethod::SmaaT2x);
+    long.settings.output.size = [32, 24];
+    long.settings.output.channels = vec![rubor_renderer::channels::Channel::Depth];
+    long.seal(&heads).expect("fingerprints");
+    run(&long, &to("whole", false)).expect("a run");
+    let whole = contents(&at("whole"));
+
+    // A run that is asked to stop finishes the frame at hand.
+    let stop = Stop::default();
+    stop.ask(2);
+    let failure = run(&long, &Destination { stop, ..to("stopped", false) }).expect_err("it stops");
+    assert_eq!((failure.exit_code(), at("stopped").exists()), (130, false), "{failure}");
+
+    // The frames of the long job, then a shorter one that stops after its first frame, then the rest of it.
+    let mut short = long.clone();
+    short.settings.look.exposure = 3.0;
+    short.sequence.duration = 0.25;
+    let refused = run(&short, &to("whole", true)).expect_err("another job");
+    assert!(refused.to_string().contains("another job"), "{refused}");
+    assert!(contents(&at("whole")) == whole, "a refused run changes nothing");
+    let first = Job { frames: Some("1".parse::<FrameList>().expect("a list")), ..short.clone() };
+    let report = run(&first, &to("whole", false)).expect("a run");
+    assert!(report.notes.iter().any(|n| n.contains("earlier run were removed")), "{:?}", report.notes);
+    std::fs::write(at("whole/.rubor-killed.part.png"), b"half").expect("a leftover");
+    assert_eq!(run(&short, &to("whole", true)).expect("a run").frames_drawn, 2);
+    run(&short, &to("short", false)).expect("a run");
+    assert!(contents(&at("whole")) == contents(&at("short")), "{:?}", contents(&at("whole")).keys());
+
+    // Chunks in any order, one of them twice.
+    let template = at("shot.yaml");
+    let written = farm::write(&long, &heads, Some(4), &template).expect("a template");
+    assert_eq!((written.frames, written.tasks), (6, 2));
+    let job = Job::read(&at("shot.json"), None).expect("a job");
+    assert_eq!(job, long);
+    for frames in ["5-6", "1-4", "5-6"] {
+        let chunk = Job { frames: Some(frames.parse::<FrameList>().expect("a list")), ..job.clone() };
+        run(&chunk, &to(&format!("out/chunks/{frames}"), true)).expect("a chunk");
+    }
+    let gather = Destination { chunks: Some(at("out/chunks")), ..to("out", true) };
+    assert_eq!(run(&job, &gather).expect("a run").frames_drawn, 0);
+    assert!(contents(&at("out")) == whole);
+    let other =
+        run(&short, &Destination { folder: at("none"), ..gather }).expect_err("chunks of another job");
+    assert!(other.to_string().contains("another job"), "{other}");
 }

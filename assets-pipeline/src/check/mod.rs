@@ -29,7 +29,7 @@ pub enum Severity {
 }
 
 /// One thing to say about a file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Finding {
     /// How bad it is.
     pub severity: Severity,
@@ -83,15 +83,19 @@ impl std::fmt::Display for Finding {
 /// Findings that differ only in their place as one, in the order of the first of each kind.
 pub fn summed(findings: Vec<Finding>) -> Vec<Finding> {
     let mut kinds: Vec<(Finding, Vec<String>)> = Vec::new();
+    let mut seen = std::collections::HashSet::new();
     let mut place_of = std::collections::HashMap::new();
     for finding in findings {
         let kind = (finding.severity, finding.message.clone(), finding.fix.clone());
         let place = *place_of.entry(kind).or_insert(kinds.len());
         let at = finding.at.clone();
         match kinds.get_mut(place) {
-            Some((_, places)) if !places.contains(&at) => places.push(at),
+            Some((_, places)) if seen.insert((place, at.clone())) => places.push(at),
             Some(_) => {}
-            None => kinds.push((finding, vec![at])),
+            None => {
+                seen.insert((place, at.clone()));
+                kinds.push((finding, vec![at]));
+            }
         }
     }
     kinds.into_iter().map(|(finding, places)| Finding { at: list(&places), ..finding }).collect()

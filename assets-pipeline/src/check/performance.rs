@@ -1,5 +1,7 @@
 //! A rig or a sequence on a head.
 
+use std::collections::BTreeSet;
+
 use rubor_rig::bind::BoundRig;
 use rubor_rig::error::{Note, RigError, summed};
 use rubor_rig::evaluate::Evaluator;
@@ -39,12 +41,9 @@ pub fn check_rig(head: &Head, rig: &Rig) -> Vec<Finding> {
         Err(e) => return vec![of_error(&e)],
     };
     let mut findings: Vec<Finding> = summed(&notes).iter().map(of_note).collect();
-    let rest = bound.neutral_weights();
-    let neutral = bound.face(&rest);
+    let neutral = bound.face(&bound.neutral_weights());
     for (i, name) in rig.expressions.keys().enumerate() {
-        let mut weights = rest.clone();
-        weights.expressions[i] = 1.0;
-        if bound.face(&weights) == neutral {
+        if bound.face_of_expression(i) == neutral {
             let message = "it changes nothing on this head";
             findings.push(
                 Finding::warning(format!("expression {name:?}"), message)
@@ -53,9 +52,7 @@ pub fn check_rig(head: &Head, rig: &Rig) -> Vec<Finding> {
         }
     }
     for (i, name) in rig.states.keys().enumerate() {
-        let mut weights = rest.clone();
-        weights.states[i] = 1.0;
-        if bound.face(&weights) == neutral {
+        if bound.face_of_state(i) == neutral {
             let message = "it changes nothing on this head";
             findings.push(
                 Finding::warning(format!("state {name:?}"), message)
@@ -80,6 +77,7 @@ pub fn check_sequence(head: &Head, rig: &Rig, sequence: &Sequence) -> (Vec<Findi
     };
     // Findings about the rig alone were reported with the rig.
     let of_rig = BoundRig::new(head, rig).map(|(_, notes)| notes).unwrap_or_default();
+    let of_rig: BTreeSet<Note> = of_rig.into_iter().collect();
     let of_sequence: Vec<Note> = notes.into_iter().filter(|n| !of_rig.contains(n)).collect();
     let mut findings: Vec<Finding> = summed(&of_sequence).iter().map(of_note).collect();
     let end = sequence.duration;

@@ -156,8 +156,8 @@ pub struct HemoglobinMaps {
 /// # Errors
 /// A file that cannot be read or is not a manifest, with line and column.
 pub fn read_manifest(file: &Path) -> Result<HemoglobinManifest, ConvertError> {
-    let text =
-        std::fs::read_to_string(file).map_err(|source| ImageError::Io { file: file.to_owned(), source })?;
+    let text = rubor_rig::limits::read_to_string(file)
+        .map_err(|source| ImageError::Io { file: file.to_owned(), source })?;
     serde_json::from_str(&text).map_err(|e| {
         ConvertError::argument(file.display().to_string(), e.to_string(), "a manifest of hemoglobin maps")
     })

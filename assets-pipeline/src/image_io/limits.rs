@@ -6,7 +6,7 @@ use super::ImageError;
 
 /// Limits that hold before anything of an image is allocated: a header may claim any size.
 ///
-/// The defaults keep a decoder below 2 GiB. They admit grey maps of 16384 x 16384 texels and colour maps of about
+/// With 2 GiB of memory, the default of a process, a decoder stays below that. They admit grey maps of 16384 x 16384 texels and colour maps of about
 /// 11000 x 11000; raise [`Limits::bytes`] for larger colour maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
@@ -19,8 +19,10 @@ pub struct Limits {
 }
 
 impl Default for Limits {
+    /// Those of this process ([`rubor_rig::limits`]): in proportion to the memory that it may take.
     fn default() -> Self {
-        Self { side: 1 << 16, pixels: 1 << 28, bytes: 2 << 30 }
+        let bytes = rubor_rig::limits::Limits::of_process().memory_bytes();
+        Self { side: 1 << 16, pixels: bytes / 8, bytes }
     }
 }
 

@@ -18,6 +18,7 @@ use glam::Vec2;
 use rubor_rig::authored::{AlphaMode, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap};
 use rubor_rig::color::srgb_decode;
 use rubor_rig::head::{Head, Material};
+use rubor_rig::limits;
 
 use super::picture::{Channel, Gallery};
 use crate::notes::Notes;
@@ -46,7 +47,7 @@ impl Library {
                 let local = file.replace('\\', "/");
                 let local = local.rsplit('/').next().unwrap_or(file);
                 let path = [folder.join(file), folder.join(local)].into_iter().find(|p| p.is_file());
-                match path.map(std::fs::read) {
+                match path.map(|p| limits::read(&p)) {
                     Some(Ok(bytes)) => library.file(folder, file, &bytes, notes),
                     Some(Err(e)) => notes.add("files of materials cannot be read", format!("{file} ({e})")),
                     None => notes
@@ -55,6 +56,20 @@ impl Library {
             }
         }
         library
+    }
+
+    /// The materials of one file.
+    pub(super) fn from_bytes(folder: &Path, bytes: &[u8], notes: &mut Notes) -> Self {
+        let mut library = Self::default();
+        library.file(folder, "", bytes, notes);
+        library
+    }
+
+    /// Names of the materials, sorted.
+    pub(super) fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.materials.keys().cloned().collect();
+        names.sort();
+        names
     }
 
     /// Whether there is any material.

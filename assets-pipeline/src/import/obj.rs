@@ -18,15 +18,15 @@
 //! - large indices overflow in it, and its errors have no place: indices are checked before, and a line is sought after.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
-use std::fs;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
+use rubor_rig::limits::{self, Limits};
 
 use crate::error::ImportError;
 use crate::notes::{Note, Notes};
-use crate::poly::{Corner, PolyMesh};
+use crate::poly::{Corner, MOST_CORNERS, PolyMesh};
 
 /// Which statement names the groups of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +71,7 @@ pub fn read(path: &Path, group_by: GroupBy) -> Result<ObjFile, ImportError> {
 
 /// As [`read`], of a file that may have points alone.
 pub(crate) fn read_points(path: &Path, group_by: GroupBy) -> Result<ObjFile, ImportError> {
-    let text = fs::read(path).map_err(ImportError::read(path))?;
+    let text = limits::read(path).map_err(ImportError::read(path))?;
     from_bytes(&text, path, group_by)
 }
 
@@ -80,6 +80,8 @@ pub(crate) fn read_points(path: &Path, group_by: GroupBy) -> Result<ObjFile, Imp
 /// # Errors
 /// As [`read`], except errors of the file itself.
 pub fn from_bytes(text: &[u8], path: &Path, group_by: GroupBy) -> Result<ObjFile, ImportError> {
+    limits::check_text(text)
+        .map_err(|(found, expected)| ImportError::content(path, "file", found, expected))?;
     if text.starts_with(&[0xff, 0xfe]) || text.starts_with(&[0xfe, 0xff]) {
         return Err(ImportError::content(path, "byte order mark", "UTF-16", "UTF-8 or Latin-1: save it so"));
     }
@@ -106,41 +108,52 @@ fn keyword(line: &[u8]) -> &[u8] {
     &line[..line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len())]
 }
 
-/// Numbered lines without comments; lines end in LF, CR LF or CR, and go on after `\` at their end.
-fn logical_lines(text: &[u8]) -> Vec<(usize, Cow<'_, [u8]>)> {
-    let mut physical: Vec<&[u8]> = Vec::new();
+/// Physical lines: they end in LF, CR LF or CR.
+fn physical_lines(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = text;
-    while !rest.is_empty() {
+    std::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
         let end = rest.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(rest.len());
-        physical.push(&rest[..end]);
+        let line = &rest[..end];
         let two = rest.get(end..end + 2) == Some(b"\r\n");
         rest = rest.get(end + if two { 2 } else { 1 }..).unwrap_or(&[]);
-    }
-    let mut lines = Vec::new();
-    let mut i = 0;
-    while i < physical.len() {
-        let number = i + 1;
-        let mut line = Cow::Borrowed(without_comment(physical[i]));
-        i += 1;
-        while let (Some(begun), Some(next)) = (line.trim_ascii_end().strip_suffix(b"\\"), physical.get(i)) {
-            if !has_numbers(keyword(&line)) && is_keyword(keyword(next)) {
-                break;
+        Some(line)
+    })
+}
+
+/// Numbered lines without comments and empty lines; a line goes on after `\` at its end.
+fn logical_lines(text: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, [u8]>)> {
+    let mut physical = physical_lines(text).enumerate().peekable();
+    std::iter::from_fn(move || {
+        loop {
+            let (i, first) = physical.next()?;
+            let mut line = Cow::Borrowed(without_comment(first));
+            while let (Some(begun), Some((_, next))) =
+                (line.trim_ascii_end().strip_suffix(b"\\"), physical.peek())
+            {
+                if !has_numbers(keyword(&line)) && is_keyword(keyword(next)) {
+                    break;
+                }
+                let kept = begun.trim_ascii_end().len();
+                let next = without_comment(next).trim_ascii_start();
+                // In place: many continued lines take no time that grows with their square.
+                let joined = line.to_mut();
+                joined.truncate(kept);
+                joined.push(b' ');
+                joined.extend_from_slice(next);
+                physical.next();
             }
-            let mut joined = begun.trim_ascii_end().to_vec();
-            joined.push(b' ');
-            joined.extend_from_slice(without_comment(next).trim_ascii_start());
-            line = Cow::Owned(joined);
-            i += 1;
+            let last = physical.peek().is_none() && has_numbers(keyword(&line));
+            if let Some(begun) = line.trim_ascii_end().strip_suffix(b"\\").filter(|_| last) {
+                line = Cow::Owned(begun.to_vec());
+            }
+            if !line.trim_ascii().is_empty() {
+                return Some((i + 1, line));
+            }
         }
-        let last = i == physical.len() && has_numbers(keyword(&line));
-        if let Some(begun) = line.trim_ascii_end().strip_suffix(b"\\").filter(|_| last) {
-            line = Cow::Owned(begun.to_vec());
-        }
-        if !line.trim_ascii().is_empty() {
-            lines.push((number, line));
-        }
-    }
-    lines
+    })
 }
 
 /// A `#` at the start or after a space begins a comment; inside a word it is part of a name.
@@ -189,6 +202,7 @@ struct Reader<'a> {
     without_uv: Vec<bool>,
     faces_without_uv: usize,
     libraries: Vec<String>,
+    known_libraries: HashSet<String>,
     names: HashMap<String, u32>,
     groups: Vec<String>,
     group: Option<u32>,
@@ -212,6 +226,7 @@ impl<'a> Reader<'a> {
             without_uv: Vec::new(),
             faces_without_uv: 0,
             libraries: Vec::new(),
+            known_libraries: HashSet::new(),
             names: HashMap::new(),
             groups: Vec::new(),
             group: None,
@@ -225,6 +240,10 @@ impl<'a> Reader<'a> {
         Err(ImportError::content(self.path, format!("line {line}"), found, expected))
     }
 
+    fn within(&self, line: usize, what: &str, count: usize, most: u64) -> Result<(), ImportError> {
+        limits::within(what, count as u64, most).or_else(|(found, expected)| self.fail(line, found, expected))
+    }
+
     fn statement(&mut self, line: usize, bytes: &[u8]) -> Result<(), ImportError> {
         let bytes = bytes.trim_ascii();
         let keyword = keyword(bytes);
@@ -233,6 +252,7 @@ impl<'a> Reader<'a> {
             b"v" => {
                 let count = self.numbers(line, "v", rest, 3)?;
                 self.point_count += 1;
+                self.within(line, "points", self.point_count, Limits::of_process().vertices())?;
                 match count {
                     3 => {}
                     4 => {
@@ -244,6 +264,7 @@ impl<'a> Reader<'a> {
             b"vt" => {
                 self.numbers(line, "vt", rest, 2)?;
                 self.uv_count += 1;
+                self.within(line, "texture coordinates", self.uv_count, 2 * Limits::of_process().vertices())?;
             }
             b"f" | b"fo" => self.face(line, rest)?,
             b"g" | b"o" => self.group = Some(self.name(rest)),
@@ -253,7 +274,7 @@ impl<'a> Reader<'a> {
             }
             b"mtllib" => {
                 let name = String::from_utf8_lossy(rest).into_owned();
-                if !name.is_empty() && !self.libraries.contains(&name) {
+                if !name.is_empty() && self.known_libraries.insert(name.clone()) {
                     self.libraries.push(name);
                 }
             }
@@ -299,6 +320,11 @@ impl<'a> Reader<'a> {
             self.notes.add("faces of fewer than 3 corners are left out", format!("line {line}"));
             return Ok(());
         }
+        if words.len() > MOST_CORNERS {
+            let message =
+                format!("faces of more than {MOST_CORNERS} corners are right only where they are convex");
+            self.notes.add(message, format!("line {line}"));
+        }
         self.faces.push('f');
         let first = self.without_uv.len();
         for word in words {
@@ -330,6 +356,8 @@ impl<'a> Reader<'a> {
             self.without_uv.push(uv == 0);
             self.faces.push_str(&if uv == 0 { format!(" {point}") } else { format!(" {point}/{uv}") });
         }
+        // Faces of four corners around each point, and as many again.
+        self.within(line, "corners of faces", self.without_uv.len(), 8 * Limits::of_process().vertices())?;
         self.faces.push('\n');
         self.given_faces.push(Given { line, end: self.faces.len() });
         self.faces_without_uv += usize::from(self.without_uv[first..].contains(&true));

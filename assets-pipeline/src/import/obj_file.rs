@@ -17,8 +17,21 @@ use crate::poly::build_head;
 /// # Errors
 /// As [`obj::read`].
 pub fn read(path: &Path) -> Result<ImportedHead, ImportError> {
-    let bytes = std::fs::read(path).map_err(ImportError::read(path))?;
+    let bytes = rubor_rig::limits::read(path).map_err(ImportError::read(path))?;
     from_bytes(&bytes, path)
+}
+
+/// Names of the materials of an `.mtl` file in memory, after reading all of it; `folder` finds pictures.
+///
+/// # Errors
+/// Nothing could be read.
+pub fn materials_from_bytes(bytes: &[u8], folder: &Path) -> Result<Vec<String>, ImportError> {
+    let mut notes = Notes::default();
+    let names = Library::from_bytes(folder, bytes, &mut notes).names();
+    match names.is_empty() {
+        true => Err(ImportError::content(folder, "materials", "none", "newmtl NAME")),
+        false => Ok(names),
+    }
 }
 
 /// Reads from memory; `path` is for messages and finds the files of materials.

@@ -19,6 +19,7 @@ use glam::{FloatExt, Vec2, Vec3};
 use rayon::prelude::*;
 use rubor_rig::head::{Head, Material, Provenance, ProvenanceKind};
 use rubor_rig::landmarks::paired;
+use rubor_rig::limits;
 
 use super::eye_projection::EyeProjection;
 use super::materials::guess_material;
@@ -169,6 +170,9 @@ pub fn read(options: &Options) -> Result<ImportedSet, ImportError> {
     mesh.points.iter_mut().for_each(|p| *p *= scale);
 
     let shape_files: Vec<&PathBuf> = files.iter().filter(|f| **f != neutral).collect();
+    let numbers = 3 * mesh.points.len() as u64 * shape_files.len() as u64;
+    limits::within("numbers of shapes", numbers, limits::Limits::of_process().numbers())
+        .map_err(|(found, expected)| ImportError::content(folder, "folder", found, expected))?;
     let read_shape = |path: &&PathBuf| -> Result<(Shape, Match, Vec<Note>), ImportError> {
         let ObjFile { mesh: shape, notes, .. } = obj::read_points(path, GroupBy::Material)?;
         if shape.points.len() != mesh.points.len() {
@@ -433,7 +437,7 @@ fn landmarks(folder: &Path, mesh: &PolyMesh, eyes: &[Eye]) -> Result<BTreeMap<St
 
 /// Positions of the 68 points of `idx_to_landmark_verts`.
 fn ibug_points(path: &Path, mesh: &PolyMesh) -> Result<Vec<Vec3>, ImportError> {
-    let text = fs::read_to_string(path).map_err(ImportError::read(path))?;
+    let text = limits::read_to_string(path).map_err(ImportError::read(path))?;
     let json: serde_json::Value = serde_json::from_str(&text)
         .map_err(|e| ImportError::content(path, format!("line {}", e.line()), e.to_string(), "JSON"))?;
     let list = json["idx_to_landmark_verts"].as_array().map_or(&[][..], Vec::as_slice);

@@ -7,6 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 use image::{ImageReader, Limits};
 use rubor_rig::authored::AuthoredImage;
+use rubor_rig::limits;
 
 /// Texels of a picture: 8192 x 8192. A head with ten such pictures is 2.7 GB in memory.
 const MOST_TEXELS: u64 = 1 << 26;
@@ -26,36 +27,55 @@ fn check_size(width: u32, height: u32) -> Result<(), String> {
     }
 }
 
-fn common(bytes: &[u8]) -> Result<(u32, u32, Vec<u8>), String> {
-    let reader = || {
-        let mut reader =
-            ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
-        // Eight bytes a texel at most, twice while one depth becomes another.
-        let mut limits = Limits::default();
-        limits.max_alloc = Some(16 * MOST_TEXELS);
-        reader.limits(limits);
-        Ok::<_, String>(reader)
+/// Width and height as the header of a picture states them.
+///
+/// # Errors
+/// No picture of a known kind, or one that is too large.
+pub(crate) fn size(bytes: &[u8]) -> Result<(u32, u32), String> {
+    let (width, height) = if bytes.starts_with(KTX2) {
+        ktx2_size(bytes)?
+    } else {
+        reader(bytes)?.into_dimensions().map_err(|e| e.to_string())?
     };
-    // What a header says is checked before memory is taken for it.
-    let (width, height) = reader()?.into_dimensions().map_err(|e| e.to_string())?;
     check_size(width, height)?;
-    let picture = reader()?.decode().map_err(|e| e.to_string())?.into_rgba8();
+    Ok((width, height))
+}
+
+fn ktx2_word(bytes: &[u8], at: usize) -> Result<u32, String> {
+    let word = bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+    word.ok_or_else(|| "KTX2: the header is cut off".to_owned())
+}
+
+fn ktx2_size(bytes: &[u8]) -> Result<(u32, u32), String> {
+    Ok((ktx2_word(bytes, 20)?, ktx2_word(bytes, 24)?))
+}
+
+fn reader(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>, String> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    // Eight bytes a texel at most, twice while one depth becomes another.
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(16 * MOST_TEXELS);
+    reader.limits(limits);
+    Ok(reader)
+}
+
+fn common(bytes: &[u8]) -> Result<(u32, u32, Vec<u8>), String> {
+    // What a header says is checked before memory is taken for it.
+    size(bytes)?;
+    let picture = reader(bytes)?.decode().map_err(|e| e.to_string())?.into_rgba8();
     Ok((picture.width(), picture.height(), picture.into_raw()))
 }
 
 /// The largest level of a KTX2 file with ETC1S or UASTC blocks.
 fn ktx2(bytes: &[u8]) -> Result<(u32, u32, Vec<u8>), String> {
-    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    let truncated = || "KTX2: the header is cut off".to_owned();
-    let (width, height) = (word(20).ok_or_else(truncated)?, word(24).ok_or_else(truncated)?);
-    check_size(width, height)?;
-    if word(36).ok_or_else(truncated)? != 1 {
+    let (width, height) = size(bytes)?;
+    if ktx2_word(bytes, 36)? != 1 {
         return Err("KTX2: a cube, where a flat picture is expected".into());
     }
     // Of the first level, before `basisu` takes memory for it: blocks of 16 bytes for 4 x 4 texels.
     let stated = bytes.get(96..104).map(|b| u64::from_le_bytes(b.try_into().unwrap_or_default()));
     let most = 16 * u64::from(width.div_ceil(4)) * u64::from(height.div_ceil(4));
-    if stated.ok_or_else(truncated)? > most {
+    if stated.ok_or_else(|| "KTX2: the header is cut off".to_owned())? > most {
         return Err(format!("KTX2: a level of {} bytes for {width} x {height} texels", stated.unwrap_or(0)));
     }
     let picture = Transcoder::new(bytes).map_err(|_| {
@@ -78,6 +98,8 @@ fn ktx2(bytes: &[u8]) -> Result<(u32, u32, Vec<u8>), String> {
 pub struct Gallery {
     /// In order of first use.
     pub images: Vec<AuthoredImage>,
+    /// Of all pictures, against [`Limits::picture_texels`].
+    texels: u64,
     known: HashMap<PathBuf, Result<u32, String>>,
 }
 
@@ -92,7 +114,7 @@ impl Gallery {
         if let Some(known) = self.known.get(&path) {
             return known.clone();
         }
-        let read = match std::fs::read(&path) {
+        let read = match limits::read(&path) {
             Ok(bytes) => self.add(&bytes, &path.file_name().unwrap_or_default().to_string_lossy()),
             Err(e) => Err(e.to_string()),
         };
@@ -103,11 +125,16 @@ impl Gallery {
 
     /// A picture in memory.
     pub(crate) fn add(&mut self, bytes: &[u8], name: &str) -> Result<u32, String> {
+        let (width, height) = size(bytes)?;
+        let texels = self.texels + u64::from(width) * u64::from(height);
+        limits::within("texels in pictures", texels, limits::Limits::of_process().picture_texels())
+            .map_err(|(found, expected)| format!("found {found}, expected {expected}"))?;
         let image = decode(bytes, name)?;
         Ok(self.push(image))
     }
 
     fn push(&mut self, image: AuthoredImage) -> u32 {
+        self.texels += u64::from(image.width) * u64::from(image.height);
         self.images.push(image);
         self.images.len() as u32 - 1
     }

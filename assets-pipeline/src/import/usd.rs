@@ -9,12 +9,13 @@
 //! What is not read, and said: composition (references, payloads, sublayers, variants, instances), joints and animation,
 //! subdivision (the cage is read), binary layers (`.usdc`), other shaders than UsdPreviewSurface.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
 use glam::{DMat4, DQuat, DVec3, EulerRot, Vec2, Vec3};
 use rubor_rig::expression::{Inbetween, Rig};
 use rubor_rig::head::Material;
+use rubor_rig::limits::{self, Limits};
 
 use super::gltf::{Extent, ImportedHead};
 use super::materials::recognise;
@@ -23,7 +24,7 @@ use super::usd_materials::Looks;
 use super::usda::{self, Layer, Prim, Value};
 use crate::error::ImportError;
 use crate::notes::Notes;
-use crate::poly::{Corner, PolyMesh, Shape, build_head};
+use crate::poly::{Corner, MOST_CORNERS, PolyMesh, Shape, build_head};
 use crate::usdz;
 
 /// Reads a layer, or a package whose first file is one.
@@ -31,7 +32,7 @@ use crate::usdz;
 /// # Errors
 /// Unreadable or broken files, binary layers, no mesh, indices out of range, a head that breaks its rules.
 pub fn read(path: &Path) -> Result<ImportedHead, ImportError> {
-    let bytes = std::fs::read(path).map_err(ImportError::read(path))?;
+    let bytes = limits::read(path).map_err(ImportError::read(path))?;
     from_bytes(&bytes, path)
 }
 
@@ -59,13 +60,21 @@ pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<ImportedHead, ImportError
         path,
         layer: &layer,
         by_path: layer.prims.iter().map(|p| (p.path.as_str(), p)).collect(),
+        subsets: HashMap::new(),
+        shape_of_name: HashMap::new(),
         notes: &mut notes,
         mesh: PolyMesh::default(),
         shapes: Vec::new(),
         materials: Vec::new(),
         names: Vec::new(),
         inbetweens: Vec::new(),
+        known_inbetweens: HashSet::new(),
     };
+    for subset in layer.prims.iter().filter(|p| p.kind == "GeomSubset") {
+        for above in usda::above(&subset.path) {
+            reader.subsets.entry(above).or_default().push(subset);
+        }
+    }
     reader.composition();
     for prim in layer.prims.iter().filter(|p| p.kind == "Mesh") {
         reader.mesh(prim)?;
@@ -81,6 +90,9 @@ struct Reader<'a> {
     path: &'a Path,
     layer: &'a Layer,
     by_path: HashMap<&'a str, &'a Prim>,
+    /// Subsets below each prim, in the order of the layer.
+    subsets: HashMap<&'a str, Vec<&'a Prim>>,
+    shape_of_name: HashMap<String, usize>,
     notes: &'a mut Notes,
     /// All meshes, in metres, y up. A group for each part.
     mesh: PolyMesh,
@@ -90,6 +102,7 @@ struct Reader<'a> {
     /// Name of each part.
     names: Vec<String>,
     inbetweens: Vec<Inbetween>,
+    known_inbetweens: HashSet<(String, String)>,
 }
 
 /// Numbers of a list of numbers or vectors.
@@ -241,6 +254,11 @@ impl Reader<'_> {
                 .map(|c| Corner { point: first + corners[c] as u32, uv: uv_of[c] })
                 .collect();
             next += count;
+            if *count > MOST_CORNERS {
+                let message =
+                    format!("faces of more than {MOST_CORNERS} corners are right only where they are convex");
+                self.notes.add(message, prim.path.as_str());
+            }
             if *count < 3 {
                 continue;
             }
@@ -301,10 +319,8 @@ impl Reader<'_> {
     /// Group of each face: subsets with a material of their own, and the rest of the mesh.
     fn subsets(&mut self, prim: &Prim, faces: usize) -> Vec<u32> {
         let mut groups = vec![u32::MAX; faces];
-        let below = format!("{}/", prim.path);
         let binding = |p: &Prim| texts(p.properties.get("material:binding")).first().map(|s| (*s).to_owned());
-        let is_subset = |p: &&Prim| p.kind == "GeomSubset" && p.path.starts_with(&below);
-        let subsets: Vec<&Prim> = self.layer.prims.iter().filter(is_subset).collect();
+        let subsets = self.subsets.get(prim.path.as_str()).cloned().unwrap_or_default();
         // Materials are inherited from prims above.
         let bound = self.ancestors(&prim.path).find_map(binding);
         for subset in subsets {
@@ -371,7 +387,7 @@ impl Reader<'_> {
                 self.add_shape(label, target, key, &indices, place, first, points);
                 let entry =
                     Inbetween { shape: name.to_owned(), target: label.to_owned(), weight: *weight as f32 };
-                if !self.inbetweens.iter().any(|i| i.shape == entry.shape && i.target == entry.target) {
+                if self.known_inbetweens.insert((entry.shape.clone(), entry.target.clone())) {
                     self.inbetweens.push(entry);
                 }
             }
@@ -390,10 +406,20 @@ impl Reader<'_> {
         points: usize,
     ) {
         let offsets = vectors(at_rest(target, property));
-        let known = self.shapes.iter().position(|s| s.name == name);
-        let shape = known.unwrap_or_else(|| {
-            self.shapes.push(Shape { name: name.to_owned(), offsets: Vec::new() });
-            self.shapes.len() - 1
+        // Shapes have an offset for every point of the head until it is built.
+        let numbers = 3 * (self.shapes.len() as u64 + 1) * self.mesh.points.len() as u64;
+        if limits::within("numbers", numbers, Limits::of_process().numbers()).is_err() {
+            let message = format!(
+                "blend shapes beyond the limit of {} numbers are left out (`--limit-memory` raises it)",
+                Limits::of_process().numbers()
+            );
+            self.notes.add(message, name);
+            return;
+        }
+        let shapes = &mut self.shapes;
+        let shape = *self.shape_of_name.entry(name.to_owned()).or_insert_with(|| {
+            shapes.push(Shape { name: name.to_owned(), offsets: Vec::new() });
+            shapes.len() - 1
         });
         let mut left_out = 0;
         let all = &mut self.shapes[shape].offsets;
@@ -418,6 +444,13 @@ impl Reader<'_> {
             return Err(ImportError::content(self.path, "layer", "no mesh", "a Mesh prim with faces"));
         }
         let count = self.mesh.points.len();
+        for (what, number, most) in [
+            ("points", count, Limits::of_process().vertices()),
+            ("numbers of blend shapes", 3 * count * self.shapes.len(), Limits::of_process().numbers()),
+        ] {
+            limits::within(what, number as u64, most)
+                .map_err(|(found, expected)| ImportError::content(self.path, "layer", found, expected))?;
+        }
         self.shapes.iter_mut().for_each(|s| s.offsets.resize(count, Vec3::ZERO));
         // By the subset, the material and the mesh, in this order.
         let kind_of = |(i, (material, mesh)): (usize, &(Option<String>, String))| {

@@ -9,13 +9,15 @@ use rubor_rig::authored::{
 };
 
 use super::picture::{Channel, Gallery};
-use super::usda::{Layer, Prim, Value};
+use super::usda::{Layer, Prim, Value, above};
 use crate::notes::Notes;
 use crate::usdz;
 
 /// Materials of a layer, each read once.
 pub(super) struct Looks<'a> {
     by_path: HashMap<&'a str, &'a Prim>,
+    /// The first UsdPreviewSurface below each prim.
+    first_surface: HashMap<&'a str, &'a Prim>,
     folder: &'a Path,
     package: Option<&'a [usdz::File<'a>]>,
     gallery: Gallery,
@@ -34,8 +36,15 @@ struct Connected {
 
 impl<'a> Looks<'a> {
     pub(super) fn new(layer: &'a Layer, folder: &'a Path, package: Option<&'a [usdz::File<'a>]>) -> Self {
+        let mut first_surface = HashMap::new();
+        for surface in layer.prims.iter().filter(|p| text(p, "info:id") == Some("UsdPreviewSurface")) {
+            for path in above(&surface.path) {
+                first_surface.entry(path).or_insert(surface);
+            }
+        }
         Self {
             by_path: layer.prims.iter().map(|p| (p.path.as_str(), p)).collect(),
+            first_surface,
             folder,
             package,
             gallery: Gallery::default(),
@@ -77,10 +86,7 @@ impl<'a> Looks<'a> {
             .find_map(|name| connection(material, name));
         let shader = connected.and_then(|target| self.by_path.get(prim_of(target)).copied());
         let is_surface = |p: &Prim| text(p, "info:id") == Some("UsdPreviewSurface");
-        let below = format!("{path}/");
-        shader
-            .filter(|p| is_surface(p))
-            .or_else(|| self.by_path.values().copied().find(|p| p.path.starts_with(&below) && is_surface(p)))
+        shader.filter(|p| is_surface(p)).or_else(|| self.first_surface.get(path).copied())
     }
 
     fn read(&mut self, path: &str, surface: &'a Prim, notes: &mut Notes) -> AuthoredMaterial {

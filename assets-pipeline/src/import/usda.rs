@@ -3,7 +3,9 @@
 //! Read: `def`, `over`, `class`, metadata (kept for the layer only), properties with values, time samples and
 //! connections. Variants and references are passed over. Binary layers (`.usdc`) are refused in words.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+
+use rubor_rig::limits;
 
 /// A fault at a line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -14,7 +16,7 @@ pub struct UsdaError {
     /// The value there.
     pub found: String,
     /// The values that are allowed.
-    pub expected: &'static str,
+    pub expected: String,
 }
 
 /// Something that a property holds.
@@ -73,13 +75,19 @@ pub struct Layer {
     pub metadata: BTreeMap<String, Value>,
     /// All prims at all depths.
     pub prims: Vec<Prim>,
+    by_path: HashMap<String, usize>,
 }
 
 impl Layer {
     /// The prim of a path.
     pub fn prim(&self, path: &str) -> Option<&Prim> {
-        self.prims.iter().find(|p| p.path == path)
+        self.by_path.get(path).map(|i| &self.prims[*i])
     }
+}
+
+/// Paths of the prims above a path, from the root down.
+pub(crate) fn above(path: &str) -> impl Iterator<Item = &str> {
+    path.match_indices('/').map(|(i, _)| &path[..i]).filter(|p| !p.is_empty())
 }
 
 /// Largest nesting depth of a head's layer.
@@ -90,12 +98,17 @@ const MOST_LEVELS: usize = 64;
 /// # Errors
 /// Binary layers, another version, the first thing that breaks the syntax.
 pub fn parse(bytes: &[u8]) -> Result<Layer, UsdaError> {
-    let fail = |found: &str, expected| Err(UsdaError { line: 1, found: found.into(), expected });
+    let fail = |found: &str, expected: &str| {
+        Err(UsdaError { line: 1, found: found.into(), expected: expected.into() })
+    };
     if bytes.starts_with(b"PXR-USDC") {
         return fail("a binary USD layer", "a text layer: convert it with `usdcat -o head.usda`");
     }
     if bytes.starts_with(b"PK") {
         return fail("a packed USD (.usdz)", "a text layer: give the package a name that ends in .usdz");
+    }
+    if let Err((found, expected)) = limits::check_text(bytes).and_then(|()| limits::check_values(bytes, 1)) {
+        return Err(UsdaError { line: 1, found, expected });
     }
     let Ok(text) = std::str::from_utf8(bytes) else { return fail("bytes that are not UTF-8", "text") };
     if !text.starts_with("#usda 1.0") {
@@ -108,6 +121,9 @@ pub fn parse(bytes: &[u8]) -> Result<Layer, UsdaError> {
     }
     while reader.peek().is_some() {
         reader.prim("", &mut layer.prims, 0)?;
+    }
+    for (i, prim) in layer.prims.iter().enumerate() {
+        layer.by_path.entry(prim.path.clone()).or_insert(i);
     }
     Ok(layer)
 }
@@ -127,7 +143,7 @@ impl Reader<'_> {
                 if word.is_empty() { format!("{:?}", char::from(c)) } else { format!("{word:?}") }
             }
         };
-        Err(UsdaError { line: self.line, found, expected })
+        Err(UsdaError { line: self.line, found, expected: expected.into() })
     }
 
     /// The next byte that is neither space nor comment.

@@ -2,6 +2,9 @@
 
 use glam::{Vec2, Vec3};
 
+/// Pixels that are tried for all triangles together: a face is covered a few times, a picture of a thousand times a
+/// thousand pixels a thousand times. What is beyond is not drawn, so that time is bounded.
+const MOST_TRIES: usize = 1 << 30;
 /// No triangle covers the pixel.
 const NONE: u32 = u32::MAX;
 
@@ -52,22 +55,27 @@ impl Depth {
     pub(super) fn draw(window: Window, triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Self {
         let count = window.width * window.height;
         let mut depth = Self { window, z: vec![f32::MIN; count], triangles: vec![NONE; count] };
+        let mut tries = 0;
         for (index, corners) in triangles.into_iter().enumerate() {
-            depth.triangle(index as u32, corners);
+            if tries >= MOST_TRIES {
+                break;
+            }
+            tries += depth.triangle(index as u32, corners);
         }
         depth
     }
 
-    fn triangle(&mut self, index: u32, corners: [Vec3; 3]) {
+    /// Draws a triangle; returns how many pixels were tried.
+    fn triangle(&mut self, index: u32, corners: [Vec3; 3]) -> usize {
         let [a, b, c] = corners.map(|p| self.window.at(p.truncate()).extend(p.z));
         let area = (b - a).truncate().perp_dot((c - a).truncate());
         if area.abs() < 1e-9 || !area.is_finite() {
-            return;
+            return 0;
         }
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         let (width, height) = (self.window.width as f32, self.window.height as f32);
         if high.x < 0.0 || high.y < 0.0 || low.x > width - 1.0 || low.y > height - 1.0 {
-            return;
+            return 0;
         }
         let (x0, x1) = (low.x.ceil().max(0.0) as usize, high.x.floor().min(width - 1.0) as usize);
         let (y0, y1) = (low.y.ceil().max(0.0) as usize, high.y.floor().min(height - 1.0) as usize);
@@ -88,6 +96,7 @@ impl Depth {
                 }
             }
         }
+        (x1 + 1).saturating_sub(x0) * (y1 + 1).saturating_sub(y0)
     }
 
     /// The triangle that a pixel shows.

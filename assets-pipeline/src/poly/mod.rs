@@ -17,7 +17,7 @@ use glam::{Vec2, Vec3};
 
 pub use build::{HeadParts, build_head};
 pub use stencil::Stencils;
-pub use triangulate::triangulate;
+pub use triangulate::{MOST_CORNERS, triangulate};
 
 /// Corner of a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,6 +6,7 @@
 //! convex, more -------------------------------------------> a fan about the first corner
 //! concave --plane of Newell's normal--> ear clipping -----> triangles that all face the way of the polygon
 //! no plane, or a border that crosses itself --------------> a fan: no triangulation is right there
+//! concave, more than 512 corners -------------------------> a fan: the time of ears grows with the square
 //! ```
 //!
 //! Ears are clipped by `earcutr`. The crate `earcut` is newer and faster, but indexes its nodes without checks in unsafe
@@ -15,6 +16,9 @@
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
+
+/// Corners of a concave polygon that is cut right.
+pub const MOST_CORNERS: usize = 512;
 
 /// Triangles of a polygon as indices into its corners, always `points.len() - 2` of them and each corner in at least
 /// one; none for fewer than three corners. The triangles keep the direction of the polygon. Corners of a plane polygon
@@ -31,7 +35,7 @@ pub fn triangulate(points: &[Vec3]) -> Vec<[u32; 3]> {
     };
     let corners: Vec<DVec3> = points.iter().map(|p| p.as_dvec3()).collect();
     let Some(normal) = newell_normal(&corners) else { return fan(0) };
-    if is_convex(&corners, normal) {
+    if is_convex(&corners, normal) || corners.len() > MOST_CORNERS {
         let shorter_second = points[1].distance_squared(points[3]) < points[0].distance_squared(points[2]);
         return fan(u32::from(count == 4 && shorter_second));
     }

@@ -44,7 +44,8 @@ pub struct Imported {
 /// # Errors
 /// Unreadable file, broken statements, no mesh that can be read, a head that breaks a rule.
 pub fn read(path: &Path, options: &Options) -> Result<Imported, ReadError> {
-    let bytes = std::fs::read(path).map_err(|source| ReadError::Read { path: path.to_owned(), source })?;
+    let bytes =
+        rubor_rig::limits::read(path).map_err(|source| ReadError::Read { path: path.to_owned(), source })?;
     from_bytes(&bytes, path, options)
 }
 

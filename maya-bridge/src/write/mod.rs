@@ -18,6 +18,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
+use rubor_assets::files::replace;
 use rubor_rig::expression::{Inbetween, Rig};
 use rubor_rig::head::Head;
 
@@ -72,13 +73,7 @@ pub fn write(
 }
 
 fn commit(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let partial = path.with_file_name(format!(".partial-{name}"));
-    std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path)).map_err(|source| {
-        // If the partial file cannot be removed either, the first error is the one to report.
-        let _ = std::fs::remove_file(&partial);
-        WriteError::Write { path: path.to_owned(), source }
-    })
+    replace(path, bytes).map_err(|source| WriteError::Write { path: path.to_owned(), source })
 }
 
 /// A scene as text. `stem` begins the names of the files beside it.

@@ -151,6 +151,12 @@ impl Gpu {
                 slot.get_or_insert_with(|| e.to_string());
             }
         }));
+        let seen = failure.clone();
+        device.set_device_lost_callback(move |reason, message| {
+            if let Ok(mut slot) = seen.lock() {
+                slot.get_or_insert_with(|| format!("the device is lost ({reason:?}) {message}"));
+            }
+        });
         let has_timestamps = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         // Each shader has at most eight other buffers.
         let stores_uniforms = info.device_type == wgpu::DeviceType::Cpu

@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let path = &arguments.recording;
     let recording = match arguments.timecode_rate {
         Some(rate) => {
-            let bytes = std::fs::read(path).map_err(|e| Failure::read(path, e))?;
+            let bytes = rubor_rig::limits::read(path).map_err(|e| Failure::read(path, e))?;
             capture::live_link::from_bytes(&bytes, path, Some(rate))?
         }
         None => capture::read(path)?,

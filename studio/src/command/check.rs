@@ -1,5 +1,6 @@
 //! `rubor check`: finds faults in files, entries without effect, and the reason why a wrinkle does not show.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use rubor_assets::check::visibility::Scene;
@@ -9,6 +10,7 @@ use rubor_assets::import::gltf::lint;
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
+use rubor_rig::limits;
 use rubor_rig::timeline::Sequence;
 use serde::Serialize;
 
@@ -206,7 +208,7 @@ fn kind(file: &Path) -> Outcome<Kind> {
 }
 
 fn json_kind(file: &Path) -> Outcome<Kind> {
-    let text = std::fs::read_to_string(file).map_err(|e| Failure::read(file, e))?;
+    let text = limits::read_to_string(file).map_err(|e| Failure::read(file, e))?;
     let has = |key: &str| text.contains(&format!("\"{key}\""));
     // A rig has neither times nor channels; a sequence needs a length; recordings have frames or columns of weights.
     Ok(if has("frames") || has("weightMat") || has("weights") && has("names") {
@@ -221,7 +223,7 @@ fn json_kind(file: &Path) -> Outcome<Kind> {
 }
 
 fn gltf(file: &Path, findings: &mut Vec<Finding>) -> Option<Subject> {
-    let loaded = std::fs::read(file)
+    let loaded = limits::read(file)
         .map_err(|e| Failure::input(format!("cannot be read: {e}")))
         .and_then(|bytes| Ok(lint(&bytes, file)?));
     match loaded {
@@ -272,7 +274,7 @@ fn maya(file: &Path, findings: &mut Vec<Finding>) -> Option<Subject> {
 }
 
 fn usd(file: &Path, findings: &mut Vec<Finding>) {
-    match std::fs::read(file) {
+    match limits::read(file) {
         Ok(bytes) => findings.extend(check::usd::check(&bytes, file.parent().unwrap_or(Path::new("")))),
         Err(e) => findings.push(Finding::error("", format!("cannot be read: {e}"))),
     }
@@ -329,12 +331,8 @@ fn as_note(finding: &Finding) -> Note {
 fn print(arguments: &Arguments, reports: &mut [Report]) -> Outcome {
     for report in reports.iter_mut() {
         report.findings.sort_by_key(|f| f.severity);
-        let mut seen: Vec<Finding> = Vec::new();
-        report.findings.retain(|f| {
-            let is_new = !seen.contains(f);
-            seen.push(f.clone());
-            is_new
-        });
+        let mut seen = HashSet::new();
+        report.findings.retain(|f| seen.insert(f.clone()));
     }
     let count = |severity: Severity| -> usize {
         reports.iter().flat_map(|r| &r.findings).filter(|f| f.severity == severity).count()

@@ -261,7 +261,7 @@ fn place_face(head: &mut Head, common: &Common, about: &str) -> Outcome {
     }
     let mut fit = landmarks::find(head);
     if let Some(file) = &common.landmarks {
-        let text = std::fs::read_to_string(file).map_err(|e| Failure::read(file, e))?;
+        let text = rubor_rig::limits::read_to_string(file).map_err(|e| Failure::read(file, e))?;
         let given = landmarks::read_given(&text, head, fit.as_ref())
             .map_err(|e| Failure::input(format!("{}: {e}", file.display())))?;
         fit = landmarks::find_with(head, &given);

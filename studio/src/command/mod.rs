@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use rubor::{Failure, Fault, Outcome};
+use rubor_rig::limits::Limits;
 
 #[macro_use]
 mod console;
@@ -21,8 +22,11 @@ mod export;
 mod filter;
 mod fit;
 mod gallery;
+mod gather;
 mod import;
+mod job;
 mod kernel;
+mod manual;
 mod maps;
 mod maya;
 mod profile;
@@ -30,13 +34,18 @@ mod render;
 mod scan_maps;
 mod schema;
 mod settings_flags;
+mod signals;
 
 /// Faces whose skin changes colour and wrinkles as they act.
 ///
-/// Exit codes: 0 done, 1 the job failed, 2 the input or the arguments are wrong.
+/// Exit codes: 0 done, 1 the job failed, 2 the input or the arguments are wrong, 130 stopped by Ctrl-C.
 #[derive(Parser)]
 #[command(name = "rubor", version, max_term_width = 110)]
 struct Arguments {
+    /// Memory that files may ask for, such as 4G: limits on sizes, points, texels and values are parts of it [default:
+    /// $RUBOR_LIMIT_MEMORY, else 2G]
+    #[arg(long, global = true, value_name = "SIZE", help_heading = "Global options")]
+    limit_memory: Option<Limits>,
     #[command(subcommand)]
     command: Command,
 }
@@ -73,13 +82,28 @@ enum Command {
     Kernel(kernel::Arguments),
     /// List the graphics adapters of this machine
     Adapters(adapters::Arguments),
+    /// Write a job for many machines: an Open Job Description template
+    Job(job::Arguments),
+    /// Make one run of the frames of chunks
+    Gather(gather::Arguments),
+    /// Print the completions of a shell
+    Completions(manual::Completions),
+    /// Write manual pages
+    Man(manual::Man),
     /// Print the JSON schema of a job, its settings, a rig, a sequence or a report
     Schema(schema::Arguments),
 }
 
 /// Runs the command of this process.
 pub(crate) fn run() -> ExitCode {
-    let outcome = match Arguments::parse().command {
+    let arguments = Arguments::parse();
+    match arguments.limit_memory.map_or_else(Limits::of_variable, |limits| Ok(Some(limits))) {
+        Ok(limits) => {
+            limits.unwrap_or_default().set();
+        }
+        Err(message) => return report(Err(Failure::input(message))),
+    }
+    let outcome = match arguments.command {
         Command::Demo(a) => demo::run(&a),
         Command::Render(a) => render::run(&a),
         Command::Gallery(a) => gallery::run(&a),
@@ -95,6 +119,10 @@ pub(crate) fn run() -> ExitCode {
         Command::Profile(a) => profile::run(&a),
         Command::Kernel(a) => kernel::run(&a),
         Command::Adapters(a) => adapters::run(&a),
+        Command::Job(a) => job::run(&a),
+        Command::Gather(a) => gather::run(&a),
+        Command::Completions(a) => manual::completions(&a),
+        Command::Man(a) => manual::man(&a),
         Command::Schema(a) => schema::run(&a),
     };
     report(outcome)

@@ -9,11 +9,21 @@ use rubor::review::inset;
 use rubor::{Destination, Job, Outcome, Plan, Report, Studio, Watch, run};
 
 use super::console::{self, Progress};
-use super::print_json;
 use super::settings_flags::{One, SettingsFlags};
+use super::{print_json, signals};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
+    #[command(flatten)]
+    contents: Contents,
+    #[command(flatten)]
+    shared: Shared,
+}
+
+/// Arguments that say what is drawn: those of `render` and `job`.
+#[derive(clap::Args)]
+#[group(skip)]
+pub(crate) struct Contents {
     /// Head (.glb, .gltf, .vrm, .obj, .usda, .usdz); repeat for several side by side [default: the built-in head]
     #[arg(long, value_name = "FILE")]
     head: Vec<PathBuf>,
@@ -30,32 +40,48 @@ pub(crate) struct Arguments {
     /// sequence file
     #[arg(long, value_name = "NAME|FILE")]
     lights: Option<String>,
-    #[command(flatten)]
-    shared: Shared,
 }
 
-/// Arguments that `render` and `demo` share.
+/// Arguments that change a job.
 #[derive(clap::Args)]
 #[group(skip)]
-pub(crate) struct Shared {
-    /// Folder for the results; made if missing
-    #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
+pub(crate) struct Changes {
     /// Frames per second [default: the sequence's]
     #[arg(long)]
     fps: Option<f64>,
     /// Draw a map of the (first) head's current state into a corner
     #[arg(long, value_enum, value_name = "MAP")]
     inset: Option<inset::Map>,
-    /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
-    #[arg(long, value_name = "NAME")]
-    adapter: Option<String>,
     /// Draw only these frames, such as 1,12-20 (the first is 1); makes no video
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
+    #[command(flatten)]
+    settings: SettingsFlags<One>,
+}
+
+/// Arguments that `render`, `gather` and `demo` share.
+#[derive(clap::Args)]
+#[group(skip)]
+pub(crate) struct Shared {
+    #[command(flatten)]
+    pub(crate) results: Results,
     /// Keep the frames that a stopped run of the same job left
     #[arg(long)]
     resume: bool,
+    #[command(flatten)]
+    changes: Changes,
+}
+
+/// Arguments that say where the results go and which there are.
+#[derive(clap::Args)]
+#[group(skip)]
+pub(crate) struct Results {
+    /// Folder for the results; made if missing
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
     /// Make no video
     #[arg(long)]
     no_video: bool,
@@ -65,39 +91,57 @@ pub(crate) struct Shared {
     /// Print the report as JSON on standard output
     #[arg(long)]
     json: bool,
-    #[command(flatten)]
-    settings: SettingsFlags<One>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let shared = &arguments.shared;
-    let (mut job, heads) = match &arguments.job {
-        Some(path) => {
-            let job = Job::read(path, shared.settings.preset())?;
-            if shared.settings.preset().is_some() && Job::read(path, None)? == job {
-                let message = "--preset has no effect: the job says all that it would choose";
-                console::notes(&[Note::new(path.display().to_string(), message)]);
+    let (job, heads) = arguments.contents.job(&shared.changes)?;
+    shared.results.make(&job, &heads, shared.resume, None)
+}
+
+impl Contents {
+    /// The job with the changes by flags, its files known by their fingerprints, and its heads.
+    pub(crate) fn job(&self, changes: &Changes) -> Outcome<(Job, Vec<LoadedHead>)> {
+        let (mut job, heads) = match &self.job {
+            Some(path) => {
+                let job = Job::read(path, changes.settings.preset())?;
+                if changes.settings.preset().is_some() && Job::read(path, None)? == job {
+                    let message = "--preset has no effect: the job says all that it would choose";
+                    console::notes(&[Note::new(path.display().to_string(), message)]);
+                }
+                let heads = job.load_heads()?;
+                (job, heads)
             }
-            let heads = job.load_heads()?;
-            (job, heads)
+            None => {
+                let heads: Vec<LoadedHead> = match &self.head[..] {
+                    [] => vec![inputs::head(None)?],
+                    files => files.iter().map(|path| inputs::head(Some(path))).collect::<Outcome<_>>()?,
+                };
+                let (sequence, notes) = inputs::sequence(self.sequence.as_deref())?;
+                console::notes(&notes);
+                let of_head = heads.first().and_then(|h| h.rig.clone());
+                let mut job = Job::new(&heads, inputs::rig(self.rig.as_deref(), of_head)?, sequence)?;
+                job.settings = changes.settings.settings(job.sequence.size)?;
+                (job, heads)
+            }
+        };
+        if let Some(lights) = &self.lights {
+            job.relight(inputs::lights(lights)?)?;
         }
-        None => {
-            let heads: Vec<LoadedHead> = match &arguments.head[..] {
-                [] => vec![inputs::head(None)?],
-                files => files.iter().map(|path| inputs::head(Some(path))).collect::<Outcome<_>>()?,
-            };
-            let (sequence, notes) = inputs::sequence(arguments.sequence.as_deref())?;
-            console::notes(&notes);
-            let of_head = heads.first().and_then(|h| h.rig.clone());
-            let mut job = Job::new(&heads, inputs::rig(arguments.rig.as_deref(), of_head)?, sequence)?;
-            job.settings = shared.settings.settings(job.sequence.size)?;
-            (job, heads)
-        }
-    };
-    if let Some(lights) = &arguments.lights {
-        job.relight(inputs::lights(lights)?)?;
+        changes.apply(&mut job)?;
+        job.seal(&heads)?;
+        Ok((job, heads))
     }
-    shared.run(job, &heads)
+}
+
+impl Changes {
+    fn apply(&self, job: &mut Job) -> Outcome {
+        self.settings.overlay(&mut job.settings)?;
+        job.sequence.fps = self.fps.unwrap_or(job.sequence.fps);
+        job.inset = self.inset.or(job.inset);
+        job.frames = self.frames.clone().or(job.frames.take());
+        Ok(())
+    }
 }
 
 impl Shared {
@@ -106,23 +150,31 @@ impl Shared {
         let heads = [inputs::head(None)?];
         let (sequence, _) = inputs::sequence(None)?;
         let mut job = Job::new(&heads, inputs::rig(None, heads[0].rig.clone())?, sequence)?;
-        job.settings = self.settings.settings(job.sequence.size)?;
-        self.run(job, &heads)
+        job.settings = self.changes.settings.settings(job.sequence.size)?;
+        self.changes.apply(&mut job)?;
+        job.seal(&heads)?;
+        self.results.make(&job, &heads, self.resume, None)
     }
+}
 
-    /// Draws a job with the changes by flags.
-    fn run(&self, mut job: Job, heads: &[LoadedHead]) -> Outcome {
-        self.settings.overlay(&mut job.settings)?;
-        job.sequence.fps = self.fps.unwrap_or(job.sequence.fps);
-        job.inset = self.inset.or(job.inset);
-        job.frames = self.frames.clone().or(job.frames);
-        let plan = Plan::new(&job, heads)?;
+impl Results {
+    /// Draws a job, or what the chunks of other runs do not have of it.
+    pub(crate) fn make(
+        &self,
+        job: &Job,
+        heads: &[LoadedHead],
+        resume: bool,
+        chunks: Option<PathBuf>,
+    ) -> Outcome {
+        let plan = Plan::new(job, heads)?;
         let mut studio = Studio::open(self.adapter.as_deref())?;
         let to = Destination {
             folder: self.output.clone(),
-            resume: self.resume,
+            resume,
+            chunks,
             video: !self.no_video,
             animated_head: !self.no_export,
+            stop: signals::watched()?,
         };
         let mut progress = Progress::default();
         let report = run::run(&plan, &mut studio, &to, &mut progress);

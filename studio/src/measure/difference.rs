@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use rubor_assets::compare::{Pixels, flip, mean_and_percentile, rel_mse, relative_rmse};
-use rubor_assets::image_io::{SampleKind, load_image};
+use rubor_assets::image_io::{Limits, ReadOptions, SampleKind, load_image_with};
 use rubor_renderer::Image;
 use rubor_rig::color::srgb_decode;
 use serde::Serialize;
@@ -100,7 +100,10 @@ pub(crate) fn pixels(image: &Image) -> Pixels {
 
 /// Linear pixels, and whether the file holds light (floats) and not display values.
 fn read(path: &Path, notes: &mut Vec<Note>) -> Outcome<(Pixels, bool)> {
-    let image = load_image(path)?;
+    // Two images, their light and the steps of FLIP: 64 bytes of memory for a pixel.
+    let all = Limits::default();
+    let limits = Limits { pixels: all.bytes / 64, bytes: all.bytes / 2, ..all };
+    let image = load_image_with(path, &ReadOptions { limits, ..ReadOptions::default() })?;
     notes.extend(image.notes.iter().map(|message| Note::new(path.display().to_string(), message)));
     let is_light = image.kind == SampleKind::F32;
     let map = &image.map;

@@ -14,22 +14,29 @@ pub enum Video {
     NoEncoder,
 }
 
-/// Encodes `frame.0001.png ...` of a folder. H.264, yuv420p, Rec. 709 with sRGB transfer, playable while it loads.
+/// Encodes `frame.0001.png` to the last of `count` frames of a folder into a file of the folder. H.264, yuv420p, Rec. 709
+/// with sRGB transfer, playable while it loads.
 ///
 /// # Errors
 /// The program fails, or the file cannot be written.
-pub fn encode(folder: &Path, first: u32, fps: f64, path: &Path) -> Outcome<Video> {
+pub fn encode(folder: &Path, count: usize, fps: f64, name: &str) -> Outcome<Video> {
     let available =
         Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !available.is_ok_and(|s| s.success()) {
         return Ok(Video::NoEncoder);
     }
+    let path = &folder.join(name);
     let mut said = String::new();
     let written = output::commit(path, |partial| {
+        let partial = partial.file_name().ok_or_else(|| std::io::Error::other("no name"))?;
+        // Names relative to the folder: ffmpeg takes `%` and `:` of a path for patterns and protocols.
         let output = Command::new("ffmpeg")
-            .args(["-y", "-loglevel", "error", "-start_number", &first.to_string()])
-            .args(["-framerate", &fps.to_string(), "-i"])
-            .arg(folder.join("frame.%04d.png"))
+            .current_dir(folder)
+            .stdin(Stdio::null())
+            .args(["-y", "-loglevel", "error", "-start_number", "1"])
+            .args(["-framerate", &fps.to_string(), "-i", "frame.%04d.png"])
+            // Later frames are none of this job.
+            .args(["-frames:v", &count.to_string()])
             // yuv420p needs even sides.
             .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv"])
             .args(["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p"])

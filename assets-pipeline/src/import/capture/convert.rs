@@ -122,8 +122,11 @@ pub fn to_sequence(
     if !doubled.is_empty() {
         report.notes.push(format!("further columns of one shape were left out: {}", list(&doubled)));
     }
-    if routes.len().saturating_mul(count) > MOST_VALUES {
-        let found = format!("{count} frames of {} columns", routes.len());
+    let moved: HashSet<&str> =
+        routes.iter().flat_map(|(_, targets)| targets).map(|t| t.shape.as_str()).collect();
+    let curves = routes.len().max(moved.len());
+    if curves.saturating_mul(count) > MOST_VALUES {
+        let found = format!("{count} frames of {curves} columns or shapes");
         return Err(wrong("length", found, &format!("at most {MOST_VALUES} values")));
     }
 

@@ -15,6 +15,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use glam::{EulerRot, Mat3, Quat, Vec3};
+use rubor_rig::limits;
 use serde_json::{Map as Object, Value};
 
 use super::timecode::{SECONDS, Timeline, Unit};
@@ -54,6 +55,8 @@ const RATES: [&str; 3] = ["exportFps", "fps", "frameRate"];
 /// # Errors
 /// Syntax, none of the layouts above, text where a number belongs, no frame with a face.
 pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Recording, ImportError> {
+    limits::check_values(bytes, 1)
+        .map_err(|(found, expected)| ImportError::content(path, "file", found, expected))?;
     let root: Value = serde_json::from_str(&text(bytes, path)?).map_err(|e| {
         let at = format!("line {}, column {}", e.line(), e.column());
         ImportError::content(path, at, e.to_string(), "JSON")

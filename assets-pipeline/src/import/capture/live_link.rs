@@ -13,6 +13,7 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use csv::{ByteRecord, ReaderBuilder};
+use rubor_rig::limits;
 use rubor_rig::names::canonical;
 
 use super::timecode::{Rate, SECONDS, Stamp, Timeline, Unit, parse};
@@ -37,6 +38,8 @@ enum Column {
 /// # Errors
 /// No `Timecode` column, no known column of weights, text where a number belongs, a row of another length, no sample.
 pub fn from_bytes(bytes: &[u8], path: &Path, timecode_rate: Option<f64>) -> Result<Recording, ImportError> {
+    limits::check_lines(bytes)
+        .map_err(|(found, expected)| ImportError::content(path, "file", found, expected))?;
     let text = text(bytes, path)?;
     let fail = |line: usize, at: &str, found: String, expected: &str| {
         let at = if at.is_empty() { format!("line {line}") } else { format!("line {line}, column {at}") };

@@ -28,6 +28,7 @@ mod timecode;
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
+use rubor_rig::limits;
 use rubor_rig::timeline::{Key, Sequence, Track};
 
 pub use convert::{Report, to_sequence};
@@ -105,7 +106,7 @@ const FASTEST: f64 = 1000.0;
 /// Unreadable file, another extension, content that breaks the format.
 pub fn read(path: &Path) -> Result<Recording, ImportError> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let bytes = std::fs::read(path).map_err(ImportError::read(path))?;
+    let bytes = limits::read(path).map_err(ImportError::read(path))?;
     match extension.as_str() {
         "csv" => live_link::from_bytes(&bytes, path, None),
         "json" => json::from_bytes(&bytes, path),
@@ -123,6 +124,8 @@ pub fn read(path: &Path) -> Result<Recording, ImportError> {
 
 /// The text of a file: UTF-8, or UTF-16 with a byte order mark, as spreadsheets write it.
 fn text<'a>(bytes: &'a [u8], path: &Path) -> Result<Cow<'a, str>, ImportError> {
+    limits::check_text(bytes)
+        .map_err(|(found, expected)| ImportError::content(path, "file", found, expected))?;
     let wide = |unit: fn([u8; 2]) -> u16| {
         let units =
             bytes[2..].chunks(2).map(|pair| unit([pair[0], pair.get(1).copied().unwrap_or_default()]));
@@ -224,7 +227,17 @@ fn inside(folder: &Path, file: &str) -> Result<PathBuf, ImportError> {
         let expected = "a path relative to the sequence's folder that does not leave it";
         return Err(ImportError::content(folder, "capture", format!("{file:?}"), expected));
     }
-    Ok(folder.join(path))
+    let path = folder.join(path);
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    // A link may lead out of the folder: compare its target. A missing file is refused when it is read.
+    if let (Ok(real), Ok(real_folder)) = (path.canonicalize(), folder.canonicalize())
+        && !real.starts_with(real_folder)
+    {
+        let found = format!("{file:?}, a link to {}", real.display());
+        let expected = "a file in the folder of the sequence or below: links cannot leave it";
+        return Err(ImportError::content(folder, "capture", found, expected));
+    }
+    Ok(path)
 }
 
 #[cfg(test)]

@@ -3,11 +3,8 @@
 use gltf::Accessor;
 use gltf::accessor::DataType;
 
-use super::document::Document;
+use super::document::{Document, Share};
 use crate::error::ImportError;
-
-/// An accessor without data may claim any count; more than this is not a head.
-const MAX_COUNT: usize = 1 << 24;
 
 /// Elements as floats; integers are scaled to 0..1 or -1..1 when normalized.
 pub(super) fn floats<const N: usize>(
@@ -84,14 +81,7 @@ fn check(
     if found != components {
         return Err(document.fail(at, format!("{found} components"), format!("{components}")));
     }
-    if accessor.count() > MAX_COUNT {
-        return Err(document.fail(
-            at,
-            format!("{} elements", accessor.count()),
-            format!("at most {MAX_COUNT}"),
-        ));
-    }
-    document.take(at, accessor.count() * components)
+    document.take(at, Share::Numbers, accessor.count().saturating_mul(components))
 }
 
 /// Byte slices of the elements of a view.

@@ -4,11 +4,13 @@
 //! files whole and panics on nodes that do not exist. A channel that cannot be read is left out with a note and never
 //! costs the head.
 
+use std::collections::HashSet;
+
 use rubor_rig::timeline::{Ease, Key, Track};
 use serde_json::Value;
 
 use super::accessor::{by_index, floats};
-use super::document::Document;
+use super::document::{Document, Share};
 use crate::error::ImportError;
 use crate::notes::Notes;
 
@@ -20,7 +22,7 @@ pub(super) const LAST_S: f32 = 86_400.0;
 const MOST_SAMPLES: f64 = 256.0;
 
 /// Target of a channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Target {
     /// Weights of the mesh of the node.
     Weights,
@@ -56,10 +58,11 @@ pub(super) struct Named {
 pub(super) fn of_animation(document: &Document, animation: usize, notes: &mut Notes) -> Vec<Named> {
     let raw = &document.raw["animations"][animation];
     let mut found: Vec<Named> = Vec::new();
+    let mut moved: HashSet<(usize, Target)> = HashSet::new();
     for (i, channel) in raw["channels"].as_array().into_iter().flatten().enumerate() {
         let at = format!("animation {animation}, channel {i}");
         match named(document, raw, channel, at.clone()) {
-            Ok(named) if found.iter().any(|f| (f.node, f.target) == (named.node, named.target)) => {
+            Ok(named) if !moved.insert((named.node, named.target)) => {
                 notes.add("channels of a target that another channel moves are left out", at);
             }
             Ok(named) => found.push(named),
@@ -151,6 +154,9 @@ impl Channel {
         if channel.times_s.is_empty() {
             return leave_out(notes, format!("all keys are later than {LAST_S} s"));
         }
+        if let Err((found, expected)) = document.try_take(Share::Keys, channel.most_keys()) {
+            return leave_out(notes, format!("found {found}, expected {expected}"));
+        }
         Some(channel)
     }
 
@@ -213,6 +219,16 @@ impl Channel {
         self.numbers = kept.iter().flat_map(|k| &numbers[k * stride..(k + 1) * stride]).copied().collect();
         self.times_s = times;
         self
+    }
+
+    /// Keys that the tracks of its numbers have at most, at up to 120 frames a second.
+    fn most_keys(&self) -> u64 {
+        let samples = |w: &[f32]| (120.0 * f64::from(w[1] - w[0])).ceil().clamp(1.0, MOST_SAMPLES) as u64;
+        let keys = match self.is_cubic() {
+            true => self.times_s.windows(2).map(samples).sum(),
+            false => self.times_s.len() as u64,
+        };
+        keys.max(1) * self.width as u64
     }
 
     fn is_cubic(&self) -> bool {

@@ -13,6 +13,7 @@ use base64::Engine;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf_json::validation::{Checked, Error, Validate};
+use rubor_rig::limits::{self, Excess, Limits};
 use serde_json::Value;
 
 use super::compressed;
@@ -27,10 +28,6 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_padding_mode(DecodePaddingMode::Indifferent)
         .with_decode_allow_trailing_bits(true),
 );
-
-/// Numbers that all accessors together may hold: a buffer may be named by many of them, an accessor without data claims
-/// any count. 800 shapes of 50 000 vertices are less.
-const MOST_NUMBERS: usize = 1 << 27;
 
 /// Extensions that do not change the data read here, or change only how a number is stored.
 const UNDERSTOOD: [&str; 7] = [
@@ -52,13 +49,69 @@ pub(super) struct Document {
     pub(super) raw: Value,
     pub(super) buffers: Vec<Vec<u8>>,
     pub(super) path: PathBuf,
-    /// Of [`MOST_NUMBERS`].
-    numbers_left: Cell<usize>,
+    budget: Budget,
+}
+
+/// What may still be read. A buffer may be named by many accessors, a mesh by many nodes, an image by many maps, and an
+/// accessor without data claims any count: sums count, not files.
+struct Budget {
+    numbers: Cell<u64>,
+    vertices: Cell<u64>,
+    keys: Cell<u64>,
+    map_values: Cell<u64>,
+    picture_texels: Cell<u64>,
+}
+
+/// What is counted against [`Limits`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Share {
+    /// Numbers of accessors.
+    Numbers,
+    /// Vertices of all meshes that nodes show.
+    Vertices,
+    /// Keys of the animation, as the reader samples them.
+    Keys,
+    /// Values of maps of a head's own.
+    MapValues,
+    /// Texels of pictures of materials.
+    PictureTexels,
+}
+
+impl Budget {
+    fn new(limits: Limits) -> Self {
+        Self {
+            numbers: Cell::new(limits.numbers()),
+            vertices: Cell::new(limits.vertices()),
+            keys: Cell::new(limits.keys()),
+            map_values: Cell::new(limits.map_values()),
+            picture_texels: Cell::new(limits.picture_texels()),
+        }
+    }
+
+    fn take(&self, share: Share, count: u64) -> Result<(), Excess> {
+        let limits = Limits::of_process();
+        let (left, what, most) = match share {
+            Share::Numbers => (&self.numbers, "numbers in accessors", limits.numbers()),
+            Share::Vertices => (&self.vertices, "vertices", limits.vertices()),
+            Share::Keys => (&self.keys, "keys", limits.keys()),
+            Share::MapValues => (&self.map_values, "values in maps", limits.map_values()),
+            Share::PictureTexels => (&self.picture_texels, "texels in pictures", limits.picture_texels()),
+        };
+        match left.get().checked_sub(count) {
+            Some(rest) => left.set(rest),
+            None => limits::within(what, (most - left.get()).saturating_add(count), most)?,
+        }
+        Ok(())
+    }
 }
 
 impl Document {
     pub(super) fn load(bytes: &[u8], path: &Path, notes: &mut Notes) -> Result<Self, ImportError> {
         let (text, mut blob) = chunks(bytes, path)?;
+        // The tree, its copy for the `gltf` crate, and what that makes of it.
+        limits::check_values(&text, 3)
+            .map_err(|(found, expected)| ImportError::content(path, "document", found, expected))?;
+        let mut bytes_left = Limits::of_process().file_bytes();
         let invalid = |e: serde_json::Error| {
             ImportError::content(path, "document", e.to_string(), "a valid glTF 2.0 document")
         };
@@ -68,13 +121,14 @@ impl Document {
             let at = format!("buffer {i}");
             let is_fallback = compressed::is_fallback(buffer);
             let data = match buffer["uri"].as_str() {
-                Some(uri) if is_fallback => resolve(path, &at, uri).unwrap_or_default(),
-                Some(uri) => resolve(path, &at, uri)?,
+                Some(uri) if is_fallback => resolve(path, &at, uri, bytes_left).unwrap_or_default(),
+                Some(uri) => resolve(path, &at, uri, bytes_left)?,
                 None if is_fallback => Vec::new(),
                 None => blob
                     .take()
                     .ok_or_else(|| ImportError::content(path, &at, "no binary chunk", "a binary chunk"))?,
             };
+            bytes_left = bytes_left.saturating_sub(data.len() as u64);
             let stated = buffer["byteLength"].as_u64().unwrap_or(0);
             if (data.len() as u64) < stated && !is_fallback {
                 let found = format!("{} bytes", data.len());
@@ -93,23 +147,18 @@ impl Document {
         check_positions(&json, path)?;
         check_indices(&json, path, notes)?;
         let gltf = gltf::Document::from_json_without_validation(json);
-        let numbers_left = Cell::new(MOST_NUMBERS);
-        Ok(Self { gltf, raw, buffers, path: path.to_owned(), numbers_left })
+        let budget = Budget::new(Limits::of_process());
+        Ok(Self { gltf, raw, buffers, path: path.to_owned(), budget })
     }
 
-    /// Takes numbers from what all accessors may hold.
-    pub(super) fn take(&self, at: &str, numbers: usize) -> Result<(), ImportError> {
-        match self.numbers_left.get().checked_sub(numbers) {
-            Some(left) => {
-                self.numbers_left.set(left);
-                Ok(())
-            }
-            None => {
-                let found = format!("{numbers} numbers more");
-                let expected = format!("at most {MOST_NUMBERS} in all accessors that are read");
-                Err(self.fail(at, found, expected))
-            }
-        }
+    /// Takes from what a head may hold.
+    pub(super) fn take(&self, at: &str, share: Share, count: usize) -> Result<(), ImportError> {
+        self.try_take(share, count as u64).map_err(|(found, expected)| self.fail(at, found, expected))
+    }
+
+    /// As [`Document::take`], where a fault does not cost the head.
+    pub(super) fn try_take(&self, share: Share, count: u64) -> Result<(), Excess> {
+        self.budget.take(share, count)
     }
 
     pub(super) fn fail(
@@ -145,14 +194,16 @@ impl Document {
                 Some(view) => self.view(&at, &view).map(Cow::Borrowed),
                 None => Err(self.fail(&at, format!("view {}", view.value()), "an existing view")),
             },
-            (None, Some(uri)) => resolve(&self.path, &at, uri).map(Cow::Owned),
+            (None, Some(uri)) => {
+                resolve(&self.path, &at, uri, Limits::of_process().file_bytes()).map(Cow::Owned)
+            }
             (None, None) => Err(self.fail(&at, "neither view nor URI", "one of them")),
         }
     }
 }
 
-/// Bytes behind a URI: data, or a file in the folder of the document or below.
-fn resolve(path: &Path, at: &str, uri: &str) -> Result<Vec<u8>, ImportError> {
+/// Bytes behind a URI: data, or a file in the folder of the document or below, of at most this length.
+fn resolve(path: &Path, at: &str, uri: &str, most: u64) -> Result<Vec<u8>, ImportError> {
     let fail = |found: String, expected: &str| Err(ImportError::content(path, at, found, expected));
     if let Some(data) = uri.strip_prefix("data:") {
         let Some((_, encoded)) = data.split_once(";base64,") else {
@@ -178,7 +229,7 @@ fn resolve(path: &Path, at: &str, uri: &str) -> Result<Vec<u8>, ImportError> {
     if !real.starts_with(real_folder) {
         return fail(format!("URI {uri:?}"), "a file in the folder of the document or below");
     }
-    fs::read(&real).map_err(ImportError::read(&file))
+    limits::read_at_most(&real, most).map_err(ImportError::read(&file))
 }
 
 /// JSON, and the binary chunk if there is one.

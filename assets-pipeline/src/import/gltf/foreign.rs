@@ -10,7 +10,7 @@ use rubor_rig::head::{BlendShape, Head, Material, Part, Vertex};
 
 use super::Extent;
 use super::accessor;
-use super::document::Document;
+use super::document::{Document, Share};
 use super::head_joints::HeadJoints;
 use super::materials::Materials;
 use super::motion::{Driver, Motion};
@@ -165,6 +165,7 @@ impl Builder<'_> {
                 .ok_or_else(|| document.fail(&at("POSITION"), "nothing", "an accessor"))?;
             let positions = accessor::floats::<3>(document, &at("POSITION"), &positions)?;
             let count = positions.len();
+            document.take(&at("POSITION"), Share::Vertices, count)?;
             let check = |what: &str, found: usize| {
                 if found == count {
                     return Ok(());

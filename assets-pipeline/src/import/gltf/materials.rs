@@ -8,7 +8,7 @@ use glam::Vec2;
 use rubor_rig::authored::{AlphaMode, Authored, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap};
 use serde_json::Value;
 
-use super::document::Document;
+use super::document::{Document, Share};
 use crate::import::picture;
 use crate::notes::Notes;
 
@@ -238,6 +238,11 @@ impl<'a> Materials<'a> {
         let read = u32::try_from(source).map_err(|e| e.to_string()).and_then(|source| {
             let bytes = self.document.image(source).map_err(|e| e.to_string())?;
             let name = self.document.raw["images"][source as usize]["name"].as_str().unwrap_or_default();
+            let (width, height) = picture::size(&bytes)?;
+            let texels = u64::from(width) * u64::from(height);
+            self.document
+                .try_take(Share::PictureTexels, texels)
+                .map_err(|(found, expected)| format!("found {found}, expected {expected}"))?;
             picture::decode(&bytes, name)
         });
         let known = match read {

@@ -27,10 +27,10 @@ mod shapes;
 mod vrm;
 mod weld;
 
-use std::fs;
 use std::path::Path;
 
 use rubor_rig::head::Head;
+use rubor_rig::limits;
 use rubor_rig::timeline::Sequence;
 
 use self::document::Document;
@@ -73,7 +73,7 @@ pub struct Extent {
 /// # Errors
 /// Unreadable or broken files, unsupported features that the file requires, no mesh, a head that breaks its rules.
 pub fn read(path: &Path) -> Result<ImportedHead, ImportError> {
-    let bytes = fs::read(path).map_err(ImportError::read(path))?;
+    let bytes = limits::read(path).map_err(ImportError::read(path))?;
     from_bytes(&bytes, path)
 }
 

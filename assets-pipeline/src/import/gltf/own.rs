@@ -11,7 +11,7 @@ use rubor_rig::head::{
 };
 use rubor_rig::map::Map;
 
-use super::document::Document;
+use super::document::{Document, Share};
 use super::materials::Materials;
 use super::motion::{Driver, Motion};
 use super::{ImportedHead, accessor, foreign, names};
@@ -103,7 +103,8 @@ fn geometry(
         ));
     }
     let mut mesh = Mesh { points: vec![Vec3::ZERO; point_count], ..Mesh::default() };
-    let mut shapes: Vec<Vec<Option<Vec3>>> = vec![vec![None; point_count]; names.len()];
+    document.take(NAME, Share::Vertices, vertex_count)?;
+    let mut shapes: Vec<Vec<(u32, Vec3)>> = vec![Vec::new(); names.len()];
     for (i, (primitive, part)) in source.primitives().zip(&extension.parts).enumerate() {
         let at = |what: &str| format!("mesh {}, primitive {i}, {what}", source.index());
         let need = |semantic: &Semantic, what: &str| {
@@ -160,14 +161,17 @@ fn geometry(
             for (p, offset) in points.iter().zip(offsets) {
                 // Values that are not stored are zero; -0 only comes from a stored offset.
                 if offset.iter().any(|c| c.to_bits() != 0) {
-                    shapes[t][*p as usize] = Some(Vec3::from_array(offset));
+                    shapes[t].push((*p, Vec3::from_array(offset)));
                 }
             }
         }
     }
-    let shapes = names.into_iter().zip(shapes).map(|(name, offsets)| {
-        let moved = offsets.into_iter().enumerate().filter_map(|(p, o)| Some((p as u32, o?)));
-        let (points, offsets) = moved.unzip();
+    let shapes = names.into_iter().zip(shapes).map(|(name, mut moved)| {
+        // Vertices of one point have one offset; of others the last one counts.
+        moved.reverse();
+        moved.sort_by_key(|(p, _)| *p);
+        moved.dedup_by_key(|(p, _)| *p);
+        let (points, offsets) = moved.into_iter().unzip();
         BlendShape { name, points, offsets, ..BlendShape::default() }
     });
     Ok((mesh, shapes.collect()))
@@ -274,6 +278,7 @@ fn map(
         let found = format!("layout {:?} of an image {width} x {height}", entry.layout);
         return Err(document.fail(&at, found, format!("{channels} channels")));
     }
+    document.take(&at, Share::MapValues, width as usize * height as usize * channels as usize)?;
     // Grey images are read as grey (a 16-bit one keeps its bits); colour images as RGBA.
     let texels: Vec<f32> = if step == 1 && picture.color().has_color() {
         picture.to_rgba32f().into_raw().into_iter().step_by(4).collect()

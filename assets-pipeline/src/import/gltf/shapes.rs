@@ -36,7 +36,7 @@ pub(super) struct Shapes {
     unique: Unique,
 }
 
-#[derive(PartialEq, Eq, Hash)]
+#[derive(Clone, PartialEq, Eq, Hash)]
 enum Key {
     Name(String),
     Target(usize, usize),
@@ -87,12 +87,18 @@ impl Shapes {
     ) -> Vec<u32> {
         let mut slots: Vec<u32> = Vec::new();
         let mut used: HashSet<usize> = HashSet::new();
+        // How many of the first slots of a key are used: many targets of one name take no time that grows with their square.
+        let mut full: HashMap<Key, usize> = HashMap::new();
         for (t, name) in of_mesh(document, mesh).0.into_iter().enumerate() {
             let driver = motion.driver(node, mesh, t);
             let key = if name.given { Key::Name(name.text.clone()) } else { Key::Target(mesh.index(), t) };
+            let start = full.entry(key.clone()).or_default();
             let known = self.same.entry(key).or_default();
-            let fitting =
-                known.iter().find(|s| !used.contains(s) && agree(&self.slots[**s].driver, &driver)).copied();
+            *start += known[*start..].iter().take_while(|s| used.contains(s)).count();
+            let fitting = known[*start..]
+                .iter()
+                .find(|s| !used.contains(s) && agree(&self.slots[**s].driver, &driver))
+                .copied();
             if let Some(slot) = fitting {
                 let Slot { driver: of_slot, mesh: first, .. } = &mut self.slots[slot];
                 let follows = match (&*of_slot, &driver) {
@@ -125,7 +131,7 @@ impl Shapes {
                 name.text.clone()
             } else {
                 let numbered = self.unique.numbered(&name.text);
-                let twice = known.iter().any(|s| used.contains(s));
+                let twice = *start > 0 || known[*start..].iter().any(|s| used.contains(s));
                 let message = if twice {
                     "targets of one mesh share a name and stay apart, numbered"
                 } else {

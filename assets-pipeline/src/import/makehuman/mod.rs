@@ -21,6 +21,7 @@ use std::path::PathBuf;
 pub use characters::{CHARACTERS, Character};
 use glam::Vec3;
 use rubor_rig::head::{Head, Material, Provenance, ProvenanceKind};
+pub use targets::from_bytes as target_from_bytes;
 
 use crate::convert::occlusion;
 use crate::error::ImportError;

@@ -15,12 +15,20 @@ const LARGEST_TEXT: u64 = 64 << 20;
 
 /// Reads a target. Points are below `point_count`.
 pub(super) fn read(path: &Path, point_count: usize) -> Result<Vec<(u32, Vec3)>, ImportError> {
-    let bytes = fs::read(path).map_err(ImportError::read(path))?;
+    let bytes = rubor_rig::limits::read(path).map_err(ImportError::read(path))?;
+    from_bytes(&bytes, path, point_count)
+}
+
+/// Reads a target from memory; `path` is for messages, and gzipped if it ends in `.gz`.
+///
+/// # Errors
+/// A line that is no point below `point_count` with three finite numbers, more than 64 MiB of text, broken gzip.
+pub fn from_bytes(bytes: &[u8], path: &Path, point_count: usize) -> Result<Vec<(u32, Vec3)>, ImportError> {
     let mut text = String::new();
     let decoded = if path.extension().is_some_and(|e| e == "gz") {
-        flate2::read::GzDecoder::new(bytes.as_slice()).take(LARGEST_TEXT + 1).read_to_string(&mut text)
+        flate2::read::GzDecoder::new(bytes).take(LARGEST_TEXT + 1).read_to_string(&mut text)
     } else {
-        bytes.as_slice().take(LARGEST_TEXT + 1).read_to_string(&mut text)
+        bytes.take(LARGEST_TEXT + 1).read_to_string(&mut text)
     };
     decoded.map_err(ImportError::read(path))?;
     if text.len() as u64 > LARGEST_TEXT {

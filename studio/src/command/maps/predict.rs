@@ -107,7 +107,7 @@ pub(super) fn run(a: &PredictArgs, notes: &mut Vec<Note>) -> Outcome<Value> {
 
 fn model(a: &PredictArgs) -> Outcome<StrainModel> {
     let Some(file) = &a.model else { return Ok(StrainModel::default()) };
-    let text = std::fs::read_to_string(file)
+    let text = rubor_rig::limits::read_to_string(file)
         .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", file.display())))?;
     serde_json::from_str(&text).map_err(|e| Failure::input(format!("{}: {e}", file.display())))
 }

@@ -180,7 +180,7 @@ fn warp(
     mean: &Map,
 ) -> Outcome<(Warp, &'static str)> {
     if let Some(file) = &a.correspondences {
-        let text = std::fs::read_to_string(file)
+        let text = rubor_rig::limits::read_to_string(file)
             .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", file.display())))?;
         let pairs: Vec<Correspondence> =
             serde_json::from_str(&text).map_err(|e| Failure::input(format!("{}: {e}", file.display())))?;

@@ -1,0 +1,4 @@
+#![no_main]
+//! See `rubor_fuzz::TARGETS`.
+
+rubor_fuzz::libfuzzer_target!("maya");
