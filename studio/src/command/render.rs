@@ -6,11 +6,15 @@ use rubor::inputs::{self, LoadedHead};
 use rubor::job::FrameList;
 use rubor::notes::Note;
 use rubor::review::inset;
-use rubor::{Destination, Job, Outcome, Plan, Report, Studio, Watch, run};
+use rubor::{Destination, Job, Outcome, Plan, Report, Studio, Watch, run, studio};
+use rubor_renderer::settings::Preset;
 
 use super::console::{self, Progress};
 use super::settings_flags::{One, SettingsFlags};
 use super::{print_json, signals};
+
+/// Size of the demo on a machine without a graphics card, pixels: a minute on two cores.
+const PREVIEW: [u32; 2] = [480, 480];
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
@@ -151,10 +155,32 @@ impl Shared {
         let (sequence, _) = inputs::sequence(None)?;
         let mut job = Job::new(&heads, inputs::rig(None, heads[0].rig.clone())?, sequence)?;
         job.settings = self.changes.settings.settings(job.sequence.size)?;
+        if self.changes.settings.preset().is_none() && is_software(self.results.adapter.as_deref()) {
+            job.settings.quality = Preset::Draft.quality();
+            let [width, height] = std::mem::replace(&mut job.settings.output.size, PREVIEW);
+            let message = format!(
+                "this machine draws on its processor: a preview of {} x {} with --preset draft; \
+                 all of it: --preset review --size {width}x{height}",
+                PREVIEW[0], PREVIEW[1]
+            );
+            console::notes(&[Note::new("demo", message)]);
+        }
         self.changes.apply(&mut job)?;
         job.seal(&heads)?;
         self.results.make(&job, &heads, self.resume, None)
     }
+}
+
+/// Whether an adapter is a processor and not a graphics card.
+fn is_software(adapter: Option<&str>) -> bool {
+    let found = studio::adapters();
+    let chosen = match adapter {
+        None => found.first(),
+        Some(wanted) => found.iter().find(|a| {
+            a.index.to_string() == wanted || a.name.to_lowercase().contains(&wanted.to_lowercase())
+        }),
+    };
+    chosen.is_some_and(|a| a.kind == "Cpu")
 }
 
 impl Results {
