@@ -70,7 +70,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             up as "up", forward as "forward", size as "size", head_count as "head_count",
             has_environment as "has_environment", jitter as "jitter", near as "near",
             light_count as "light_count", shading_jitter as "shading_jitter", depth_origin_mm as "depth_origin_mm",
-            environment_turn as "environment_turn"),
+            environment_turn as "environment_turn", windows as "windows"),
     );
     assert_layout(
         &shade::program(),
@@ -705,4 +705,58 @@ fn a_frame_can_be_drawn_while_the_one_before_is_read() {
     assert_eq!(one_by_one.len(), 5);
     assert_ne!(one_by_one[1].0, one_by_one[4].0, "the film moves");
     assert!(film(true) == one_by_one, "pictures and channels are those of their own frame");
+}
+
+#[test]
+fn windows_hold_all_pixels_of_their_heads() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let mut strong = FaceState::neutral(&head);
+    strong.shapes.fill(1.5);
+    strong.head_rotation = Quat::from_rotation_z(0.4);
+    let calm = FaceState::neutral(&head);
+    let at = |x: f32, y: f32, z: f32| Mat4::from_translation(Vec3::new(x, y, z));
+    // In the middle, at the border, out of the picture, beside the camera and before it.
+    let places =
+        [at(0.0, 0.0, 0.0), at(0.2, 0.1, 0.0), at(-0.45, 0.0, 0.1), at(3.0, 0.0, 0.0), at(0.1, 0.0, 0.85)];
+    let heads: Vec<_> = places
+        .iter()
+        .enumerate()
+        .map(|(i, place)| HeadInstance {
+            head: &on_gpu,
+            state: if i % 2 == 1 { &strong } else { &calm },
+            world_from_head: *place,
+        })
+        .collect();
+    let scene = Scene {
+        heads: &heads,
+        camera: Camera { position: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 40.0 },
+        lights: &[lamp()],
+        environment: None,
+        environment_rotation: 0.0,
+        environment_intensity: 0.0,
+        background_linear: Vec3::ZERO,
+    };
+    let size = [96, 64];
+    render(&mut renderer, &scene, &settings(size)).expect("it draws");
+    let ids = read(&renderer, Channel::Ids);
+    let windows = crate::scene::view::windows(&scene, size);
+    assert_eq!((windows[0].first, windows[0].size), ([0; 2], size));
+    assert_eq!(windows[3].size, [0; 2], "it is out of the picture");
+    let mut pixels = [0; 5];
+    let albedo = read_texels(&renderer, Channel::Albedo);
+    for (i, [id]) in ids.texels::<1>().enumerate().filter(|(_, [id])| *id != 0.0) {
+        let head = (id.to_bits() >> 27) as usize;
+        let (at, w) = ([i as u32 % size[0], i as u32 / size[0]], windows[head]);
+        assert!(
+            (0..2).all(|k| at[k] >= w.first[k] && at[k] - w.first[k] < w.size[k]),
+            "{at:?} of {head}: {w:?}"
+        );
+        assert!(albedo[i][3] > 0.0, "{at:?} of {head} is not shaded");
+        pixels[head] += 1;
+    }
+    assert!(pixels[0] > 50 && pixels[1] > 50 && pixels[2] > 20 && pixels[4] > 50, "{pixels:?}");
+    let area = |w: &crate::scene::view::Window| w.size[0] * w.size[1];
+    assert!(area(&windows[1]) < size[0] * size[1] / 4, "{:?} for {} pixels", windows[1], pixels[1]);
 }

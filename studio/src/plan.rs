@@ -72,7 +72,7 @@ impl<'a> Plan<'a> {
                         { \"name\": \"studio\" } in the sequence)";
             notes.push(Note::new("sequence", hint));
         }
-        let spacing_m = heads.iter().map(|h| width(&h.head)).fold(0.0, f32::max) * SPACING;
+        let spacing_m = spacing_m(heads.iter().map(|h| &h.head));
         Ok(Self { job, heads, evaluators, frames, spacing_m, notes })
     }
 
@@ -104,10 +104,7 @@ impl<'a> Plan<'a> {
     /// Shots of all heads at a frame, from the camera of the first; several heads are seen from further away.
     pub fn shots(&self, frame: u32) -> Vec<Shot> {
         let mut shots: Vec<Shot> = self.evaluators.iter().map(|e| e.at(e.frame_time_s(frame))).collect();
-        let n = shots.len() as f32;
-        if let Some(Shot { camera, .. }) = shots.first_mut() {
-            camera.position = camera.target + (camera.position - camera.target) * n;
-        }
+        step_back(&mut shots);
         shots
     }
 
@@ -166,6 +163,16 @@ pub struct Shown {
     pub drawn: Frame,
 }
 
-fn width(head: &Head) -> f32 {
-    head.bounds().map_or(0.0, |(low, high)| high.x - low.x)
+/// Metres between the middles of heads that stand side by side.
+pub fn spacing_m<'a>(heads: impl IntoIterator<Item = &'a Head>) -> f32 {
+    let width = |head: &Head| head.bounds().map_or(0.0, |(low, high)| high.x - low.x);
+    heads.into_iter().map(width).fold(0.0, f32::max) * SPACING
+}
+
+/// Moves the camera of the first shot, which is that of all, away until it shows as many heads side by side.
+pub fn step_back(shots: &mut [Shot]) {
+    let n = shots.len() as f32;
+    if let Some(Shot { camera, .. }) = shots.first_mut() {
+        camera.position = camera.target + (camera.position - camera.target) * n;
+    }
 }

@@ -122,7 +122,7 @@ pub struct BenchReport {
     pub rows: Vec<BenchRow>,
 }
 
-/// One settings in milliseconds per frame.
+/// One settings and number of heads in milliseconds per frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct BenchRow {
@@ -130,6 +130,8 @@ pub struct BenchRow {
     pub name: String,
     /// How frames were made.
     pub settings: Settings,
+    /// Heads side by side.
+    pub heads: usize,
     /// From the beginning of the first pass to the end of the last.
     pub frame: PassCost,
     /// Each pass, in the order of its first run.

@@ -7,6 +7,8 @@
 //!
 //! This is the only file that knows the renderer's `Renderer` and how a device is opened.
 
+use std::rc::Rc;
+
 use glam::{Mat4, Vec3};
 use image::RgbImage;
 use rubor_renderer::channels::ChannelData;
@@ -50,7 +52,7 @@ pub fn adapters() -> Vec<AdapterDescription> {
 pub struct Studio {
     renderer: Renderer,
     skin: SkinLookup,
-    heads: Vec<HeadOnGpu>,
+    heads: Vec<Rc<HeadOnGpu>>,
     surroundings: Surroundings,
     notes: Vec<Note>,
     /// Whether what turns triangles into pixels was chosen for these heads.
@@ -121,16 +123,24 @@ impl Studio {
         self.renderer.gpu().has_timestamps
     }
 
-    /// Replaces the heads; a frame takes one shot per head, in this order.
+    /// Replaces the heads; a frame takes one shot per head, in this order. One that is there several times is kept once.
     ///
     /// # Errors
     /// A head breaks its rules or does not fit the device.
     pub fn set_heads<'a>(&mut self, heads: impl IntoIterator<Item = &'a Head>) -> Outcome {
         let color =
             ColorTable { width: self.skin.width, height: self.skin.height, texels: &self.skin.texels };
-        let heads: Result<_, _> =
-            heads.into_iter().map(|head| HeadOnGpu::new(self.renderer.gpu(), head, &color)).collect();
-        self.heads = heads?;
+        let mut known: Vec<(&Head, Rc<HeadOnGpu>)> = Vec::new();
+        for head in heads {
+            let kept =
+                known.iter().find(|(other, _)| std::ptr::eq(*other, head)).map(|(_, kept)| kept.clone());
+            let on_gpu = match kept {
+                Some(kept) => kept,
+                None => Rc::new(HeadOnGpu::new(self.renderer.gpu(), head, &color)?),
+            };
+            known.push((head, on_gpu));
+        }
+        self.heads = known.into_iter().map(|(_, kept)| kept).collect();
         self.raster_is_chosen = false;
         Ok(())
     }
@@ -181,23 +191,22 @@ impl Studio {
         Ok(Frame { image, stats, channels })
     }
 
-    /// Draws a shot of one head again and again, one frame right after the other, and returns the cost of each; the
-    /// first
-    /// `warm_up` frames are left out.
+    /// Draws shots of heads side by side again and again, one frame right after the other, and returns the cost of each;
+    /// the first `warm_up` frames are left out.
     ///
     /// # Errors
     /// As [`Studio::draw`]; a method that does not draw a frame in one go.
     pub fn measure(
         &mut self,
-        shot: &Shot,
+        shots: &[Shot],
+        spacing_m: f32,
         settings: &Settings,
         warm_up: u32,
         frames: u32,
     ) -> Outcome<Vec<FrameTimes>> {
-        let shots = std::slice::from_ref(shot);
-        self.choose_raster(shots, 0.0, settings)?;
+        self.choose_raster(shots, spacing_m, settings)?;
         let gpu = self.renderer.gpu().clone();
-        self.with_scene(shots, 0.0, |renderer, scene| {
+        self.with_scene(shots, spacing_m, |renderer, scene| {
             Ok(native::wait(&gpu, renderer.measure(scene, settings, warm_up, frames))?)
         })
     }

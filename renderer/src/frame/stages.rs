@@ -9,7 +9,7 @@ use crate::passes::diffusion::Before;
 use crate::passes::shade::{Lighting, Lit, SkinLight};
 use crate::scene::lamp::{Illumination, place_lights};
 use crate::scene::placement::{average_light, receivers};
-use crate::scene::view::{Seen, View, pixels_per_mm, view};
+use crate::scene::view::{Seen, View, Window, pixels_per_mm, view, windows};
 
 /// Results of the samples of a pixel so far.
 #[derive(Default)]
@@ -56,14 +56,15 @@ impl<'a> Frame<'a> {
             size: self.settings.frame_size(),
             heads: &self.heads,
             light,
-            view: r.uniform("view", &self.view([[0.0; 2]; 2])),
+            view: r.uniform("view", &self.view([[0.0; 2]; 2], &[])),
             shade: &self.passes.shade,
             transmittance: self.passes.transmittance.as_ref().map(|(_, t)| t),
         }
     }
 
-    fn view(&self, jitters: [[f32; 2]; 2]) -> View {
-        view(self.scene, &self.lamps, self.settings.frame_size(), jitters, self.past.clip_from_world)
+    fn view(&self, jitters: [[f32; 2]; 2], windows: &[Window]) -> View {
+        let size = self.settings.frame_size();
+        view(self.scene, &self.lamps, size, jitters, windows, self.past.clip_from_world)
     }
 
     /// What the camera sees through one sample of each pixel.
@@ -76,11 +77,12 @@ impl<'a> Frame<'a> {
         // A camera samples a place in the pixel by shifting the image in the opposite direction.
         let jitters = [subsample.position_px.map(|p| -p), shading_jitter];
         let size = self.settings.frame_size();
-        let view = self.view(jitters);
+        let windows = windows(self.scene, size);
+        let view = self.view(jitters, &windows);
         let pixels_per_mm = pixels_per_mm(self.scene, &view);
         let view = r.uniform("view", &view);
         let [ids, depth] = self.passes.visibility.record(r, &view, &self.heads, size);
-        Seen { view, pixels_per_mm, ids, depth }
+        Seen { view, pixels_per_mm, ids, depth, windows }
     }
 
     /// Light of the surface that a sample sees. A second sample reuses the light of the first where both see the same
@@ -117,7 +119,15 @@ impl<'a> Frame<'a> {
         let moves = is_first && self.settings.quality.antialias.is_temporal();
         let velocity = moves.then(|| passes.velocity.record(r, &seen, &self.heads));
         let hair = (&passes.fibre, light);
-        passes.cropped_hair.record(r, hair, &seen, &self.heads, &hdr, velocity.as_ref());
+        passes.cropped_hair.record(
+            r,
+            hair,
+            self.settings.quality.detail,
+            &seen,
+            &self.heads,
+            &hdr,
+            velocity.as_ref(),
+        );
         let ambient = average_light(self.scene);
         passes.overlay.record(r, hair, ambient, &seen, &self.heads, &hdr, velocity.as_ref());
         let lighting = Lighting {

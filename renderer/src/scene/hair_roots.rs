@@ -71,8 +71,8 @@ fn averaged(map: &Map) -> Map {
     out
 }
 
-/// Hairs of a head whose triangles are `triangles` (vertices and number of the material). The same head has the same
-/// hairs.
+/// Hairs of a head whose triangles are `triangles` (vertices and number of the material), in random order. The same head
+/// has the same hairs.
 pub(crate) fn roots(head: &Head, triangles: &[[u32; 4]]) -> Vec<Root> {
     let Some(map) = &head.maps.hair else { return Vec::new() };
     let cover = averaged(map);
@@ -125,7 +125,7 @@ pub(crate) fn roots(head: &Head, triangles: &[[u32; 4]]) -> Vec<Root> {
                 continue;
             }
             if all.len() == MOST {
-                return all;
+                return mixed(all, &mut random);
             }
             let length = (SHORTEST + (1.0 - SHORTEST) * here * (0.55 + 0.45 * pace)).min(1.0);
             all.push(Root {
@@ -135,6 +135,14 @@ pub(crate) fn roots(head: &Head, triangles: &[[u32; 4]]) -> Vec<Root> {
                 look: pack_unorm(length, tone),
             });
         }
+    }
+    mixed(all, &mut random)
+}
+
+/// The hairs in random order (Fisher and Yates), so that any number of the first ones stands for all.
+fn mixed(mut all: Vec<Root>, random: &mut Random) -> Vec<Root> {
+    for i in (1..all.len()).rev() {
+        all.swap(i, ((random.next() * (i + 1) as f32) as usize).min(i));
     }
     all
 }

@@ -11,6 +11,8 @@ use crate::device::{Gpu, Image, ImageSpec};
 
 /// Bytes of the tangent frame of a vertex: normal, occlusion, tangent, sign.
 const FRAME_BYTES: u64 = 32;
+/// Bytes of a lit hair: ends, motion, light.
+pub(crate) const HAIR_BYTES: u64 = 64;
 
 /// A head in a state at a place, with the results of the passes before the view.
 #[derive(Clone, Copy)]
@@ -32,6 +34,8 @@ pub(crate) struct PosedHead<'a> {
     pub(crate) blood: &'a Image,
     /// Weight of each wrinkle map, four per layer: an array, whatever its number of layers.
     pub(crate) wrinkle_weights: &'a Image,
+    /// Lit hairs of the scalp.
+    pub(crate) hairs: &'a wgpu::Buffer,
 }
 
 /// The buffers of one head of a scene, kept from frame to frame.
@@ -41,6 +45,7 @@ pub(crate) struct Instance {
     pub(crate) tangent_frames: wgpu::Buffer,
     blood: Image,
     wrinkle_weights: Image,
+    hairs: wgpu::Buffer,
 }
 
 /// Four wrinkle maps have their weights in one layer.
@@ -60,6 +65,7 @@ impl Instance {
             tangent_frames: gpu.storage_zeroed("tangent frames", u64::from(head.vertex_count) * FRAME_BYTES),
             blood: Image::new(gpu, "blood", ImageSpec::light(side)),
             wrinkle_weights,
+            hairs: gpu.storage_zeroed("hairs", hair_bytes(head)),
         }
     }
 
@@ -68,13 +74,18 @@ impl Instance {
         self.positions.size() == (u64::from(head.point_count) * 16).max(16)
             && self.tangent_frames.size() == (u64::from(head.vertex_count) * FRAME_BYTES).max(16)
             && self.wrinkle_weights.texture().depth_or_array_layers() == layers(head)
+            && self.hairs.size() == hair_bytes(head).max(16)
     }
 
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
-        let buffers = [&self.positions, &self.previous_positions, &self.tangent_frames];
+        let buffers = [&self.positions, &self.previous_positions, &self.tangent_frames, &self.hairs];
         buffers.iter().map(|b| b.size()).sum::<u64>() + self.blood.bytes() + self.wrinkle_weights.bytes()
     }
+}
+
+fn hair_bytes(head: &HeadOnGpu) -> u64 {
+    u64::from(head.hair_root_count) * HAIR_BYTES
 }
 
 fn layers(head: &HeadOnGpu) -> u32 {
@@ -98,6 +109,7 @@ pub(crate) fn posed<'a>(
         tangent_frames: &buffers.tangent_frames,
         blood: &buffers.blood,
         wrinkle_weights: &buffers.wrinkle_weights,
+        hairs: &buffers.hairs,
     };
     scene.heads.iter().zip(instances).enumerate().map(posed).collect()
 }

@@ -395,6 +395,13 @@ groups! {
         /// Compute: one invocation per triangle, the largest key of depth and number per pixel.
         Compute, "compute", Geometry, "Laine and Karras 2011; Karis et al. 2021";
     }
+    /// What is drawn of things that are smaller than a pixel.
+    DetailMethod, "detail", "Things smaller than a pixel" {
+        /// Fewer and denser hairs where a pixel is wider than a hair.
+        Auto, "auto", Geometry, "Cook et al. 2007";
+        /// All of them.
+        Full, "full", Geometry, "";
+    }
     /// Antialiasing of the displayed picture.
     AntialiasMethod, "antialias", "Antialiasing" {
         /// Edges stay stairs.
@@ -464,10 +471,11 @@ mod tests {
         check::<WrinkleMethod>(&WrinkleMethod::GROUP);
         check::<SpecularMethod>(&SpecularMethod::GROUP);
         check::<RasterMethod>(&RasterMethod::GROUP);
+        check::<DetailMethod>(&DetailMethod::GROUP);
         check::<AntialiasMethod>(&AntialiasMethod::GROUP);
         check::<ToneMap>(&ToneMap::GROUP);
         check::<CurvatureMethod>(&CurvatureMethod::GROUP);
-        assert_eq!(GROUPS.len(), 9, "a new group is checked above");
+        assert_eq!(GROUPS.len(), 10, "a new group is checked above");
         assert_eq!(ScatterMethod::all().count(), ScatterMethod::GROUP.methods.len());
         assert_eq!("reference-surface".parse(), Ok(ScatterMethod::ReferenceSurface(64)));
     }

@@ -30,8 +30,8 @@ use crate::channels::Channel;
 pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
-    AntialiasMethod, ColorMethod, CurvatureMethod, GROUPS, Group, Method, RasterMethod, ScatterMethod,
-    SpecularMethod, Stage, ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
+    AntialiasMethod, ColorMethod, CurvatureMethod, DetailMethod, GROUPS, Group, Method, RasterMethod,
+    ScatterMethod, SpecularMethod, Stage, ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
 
@@ -82,6 +82,8 @@ pub struct Quality {
     pub specular: SpecularMethod,
     /// What turns triangles into pixels; the picture is the same up to the rounding of edges
     pub raster: RasterMethod,
+    /// What is drawn of things smaller than a pixel.
+    pub detail: DetailMethod,
     /// Antialiasing of the displayed picture
     pub antialias: AntialiasMethod,
     /// Thresholds and search lengths of the antialiasing
@@ -178,6 +180,7 @@ impl Default for Quality {
             wrinkles: WrinkleMethod::PartialDerivative,
             specular: SpecularMethod::OneLobe,
             raster: RasterMethod::Auto,
+            detail: DetailMethod::Auto,
             antialias: AntialiasMethod::SmaaS2x,
             antialias_preset: AntialiasPreset::High,
             antialias_patterns: AntialiasPatterns::Revised,

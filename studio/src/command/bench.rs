@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use rubor::measure::bench::{self, Frames};
+use rubor::measure::bench::{self, Crowd, Frames};
 use rubor::measure::file_name;
 use rubor::report::BenchRow;
-use rubor::{Outcome, Report, Studio, inputs, output};
+use rubor::{Outcome, Report, Studio, inputs, output, plan};
+use rubor_renderer::MAX_HEADS;
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::timeline::{Camera, Framing};
 
@@ -23,6 +24,9 @@ pub(crate) struct Arguments {
     /// Time of that frame, seconds
     #[arg(long, default_value_t = 5.0, value_parser = parse_time)]
     time: f64,
+    /// Numbers of copies of the head side by side, all in view (1 to 31); several with commas between
+    #[arg(long, value_name = "N", default_value = "1", value_delimiter = ',', value_parser = parse_heads)]
+    heads: Vec<usize>,
     /// Timed frames
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
@@ -47,6 +51,11 @@ fn parse_time(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("found {text:?}, expected a time in seconds, 0 or more"))
 }
 
+fn parse_heads(text: &str) -> Result<usize, String> {
+    let number = text.parse::<usize>().ok().filter(|n| (1..=MAX_HEADS).contains(n));
+    number.ok_or_else(|| format!("found {text:?}, expected a number of heads from 1 to {MAX_HEADS}"))
+}
+
 #[derive(Clone, Debug)]
 struct Timing;
 impl Purpose for Timing {
@@ -67,15 +76,15 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let (evaluator, _) = Evaluator::new(&loaded.head, &rig, &sequence)?;
     let shot = evaluator.at(arguments.time);
     let mut studio = Studio::open(arguments.adapter.as_deref())?;
-    studio.set_heads([&loaded.head])?;
     if let Some(folder) = &arguments.output {
         output::folder(folder)?;
     }
     let frames = Frames { timed: arguments.frames, warm_up: arguments.warm_up };
-    let report = bench::run(&mut studio, &shot, &all, frames, |row, studio| {
+    let crowd = Crowd { head: &loaded.head, shot: &shot, counts: &arguments.heads };
+    let report = bench::run(&mut studio, &crowd, &all, frames, |row, studio, shots| {
         if let Some(folder) = &arguments.output {
             studio.cut(0);
-            let frame = studio.render(std::slice::from_ref(&shot), 0.0, &row.settings)?;
+            let frame = studio.render(shots, plan::spacing_m([&loaded.head]), &row.settings)?;
             output::save_picture(&folder.join(format!("{}.png", file_name(&row.name))), &frame.picture())?;
         }
         if arguments.json { Ok(()) } else { print(row) }

@@ -43,7 +43,7 @@ impl Purpose for Charting {
         ("antialias", "none"),
         (
             "scatter",
-            "none,pre-integrated:1,pre-integrated:3,separable:9,separable:17,separable:33,screen-gauss:4,screen-gauss:6,screen-jitter,burley-disk:16,burley-disk:64",
+            "none,separable:9,separable:17,separable:33,screen-gauss:4,screen-gauss:6,screen-jitter,burley-disk:16,burley-disk:64,pre-integrated:1,pre-integrated:3,texture-space:1024,dipole-cubemap:16",
         ),
     ];
 }

@@ -1,15 +1,17 @@
 //! GPU time of each pass, frames drawn back to back.
 //!
 //! ```text
-//! a shot --each settings--> warm-up, frames --timestamps--> median and spread of each pass
+//! a shot --each number of heads, each settings--> warm-up, frames --timestamps--> median and spread of each pass
 //! ```
 
 use rubor_renderer::FrameTimes;
 use rubor_renderer::settings::Settings;
 use rubor_rig::evaluate::Shot;
+use rubor_rig::head::Head;
 
 use super::names;
 use crate::error::{Failure, Outcome};
+use crate::plan;
 use crate::report::{BenchReport, BenchRow, PassCost};
 use crate::studio::Studio;
 
@@ -22,28 +24,48 @@ pub struct Frames {
     pub warm_up: u32,
 }
 
-/// Times a shot of the one head of a studio with each settings; `told` gets each row as soon as it is measured.
+/// What is drawn: a head, once or as many times side by side.
+#[derive(Clone, Copy, Debug)]
+pub struct Crowd<'a> {
+    /// The head.
+    pub head: &'a Head,
+    /// What each of them shows; the camera moves away until it sees all.
+    pub shot: &'a Shot,
+    /// Numbers of heads.
+    pub counts: &'a [usize],
+}
+
+/// Times a shot of each number of heads with each settings; `told` gets each row as soon as it is measured.
 ///
 /// # Errors
 /// A device without timestamps; errors of the studio and of `told`.
 pub fn run(
     studio: &mut Studio,
-    shot: &Shot,
+    crowd: &Crowd<'_>,
     all: &[Settings],
     frames: Frames,
-    mut told: impl FnMut(&BenchRow, &mut Studio) -> Outcome,
+    mut told: impl FnMut(&BenchRow, &mut Studio, &[Shot]) -> Outcome,
 ) -> Outcome<BenchReport> {
     if !studio.has_timestamps() {
         let name = studio.adapter().name;
         return Err(Failure::job(format!("{name} has no timestamps, so passes cannot be timed")));
     }
     let mut rows = Vec::new();
-    for (settings, name) in all.iter().zip(names(all, &["scatter", "transmit", "antialias"])) {
-        let times = studio.measure(shot, settings, frames.warm_up, frames.timed)?;
-        let frame = summary("frame", 1, times.iter().map(|t| t.frame_ms).collect());
-        let row = BenchRow { name, settings: settings.clone(), frame, passes: passes(&times) };
-        told(&row, studio)?;
-        rows.push(row);
+    let spacing_m = plan::spacing_m([crowd.head]);
+    for &heads in crowd.counts {
+        studio.set_heads(std::iter::repeat_n(crowd.head, heads))?;
+        let mut shots = vec![crowd.shot.clone(); heads];
+        plan::step_back(&mut shots);
+        for (settings, mut name) in all.iter().zip(names(all, &["scatter", "transmit", "antialias"])) {
+            if heads > 1 || crowd.counts.len() > 1 {
+                name = format!("{name}, heads {heads}");
+            }
+            let times = studio.measure(&shots, spacing_m, settings, frames.warm_up, frames.timed)?;
+            let frame = summary("frame", 1, times.iter().map(|t| t.frame_ms).collect());
+            let row = BenchRow { name, settings: settings.clone(), heads, frame, passes: passes(&times) };
+            told(&row, studio, &shots)?;
+            rows.push(row);
+        }
     }
     Ok(BenchReport { adapter: studio.adapter(), frames: frames.timed, warm_up: frames.warm_up, rows })
 }

@@ -196,7 +196,7 @@ fn passes_ms(
     counts: &dyn Fn(&str) -> bool,
 ) -> Outcome<Option<f64>> {
     // As many warm-up frames, which raise the clock of the device.
-    let times = studio.measure(shot, settings, frames, frames)?;
+    let times = studio.measure(std::slice::from_ref(shot), 0.0, settings, frames, frames)?;
     let mut ms: Vec<f64> = times
         .iter()
         .map(|t| t.passes_ms.iter().filter(|(name, _)| counts(name)).fold(0.0, |sum, (_, ms)| sum + ms))

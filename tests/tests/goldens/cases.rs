@@ -54,6 +54,7 @@ pub(crate) struct Methods {
     pub(crate) wrinkles: &'static str,
     pub(crate) specular: &'static str,
     pub(crate) raster: &'static str,
+    pub(crate) detail: &'static str,
     pub(crate) antialias: &'static str,
     pub(crate) tone_map: &'static str,
     pub(crate) exposure: f32,
@@ -85,6 +86,7 @@ const USUAL: Methods = Methods {
     wrinkles: "partial-derivative",
     specular: "one-lobe",
     raster: "auto",
+    detail: "auto",
     antialias: "none",
     tone_map: "filmic",
     exposure: 1.0,
@@ -113,6 +115,7 @@ impl Methods {
             "wrinkles" => self.wrinkles,
             "specular" => self.specular,
             "raster" => self.raster,
+            "detail" => self.detail,
             "antialias" => self.antialias,
             "tone-map" => self.tone_map,
             _ => return None,
@@ -122,8 +125,19 @@ impl Methods {
 
 /// All pictures.
 pub(crate) fn all() -> Vec<Case> {
-    [scatter(), transmit(), appearance(), antialias(), lights(), materials(), passes(), raster(), heads()]
-        .concat()
+    [
+        scatter(),
+        transmit(),
+        appearance(),
+        antialias(),
+        lights(),
+        materials(),
+        passes(),
+        raster(),
+        detail(),
+        heads(),
+    ]
+    .concat()
 }
 
 fn scatter() -> Vec<Case> {
@@ -184,6 +198,13 @@ fn raster() -> Vec<Case> {
             models: &[Model::Authored],
             ..case(&format!("raster-{raster}"), "portrait", Methods { raster, ..USUAL })
         })
+        .to_vec()
+}
+
+/// A head from so far that a pixel is wider than a hair.
+fn detail() -> Vec<Case> {
+    ["full", "auto"]
+        .map(|detail| case(&format!("detail-{detail}"), "head", Methods { detail, ..USUAL }))
         .to_vec()
 }
 

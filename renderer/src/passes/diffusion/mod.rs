@@ -72,6 +72,7 @@ impl Before<'_> {
             pixels_per_mm: 1.0,
             ids: r.image("no ids", ImageSpec::attachment([1, 1], wgpu::TextureFormat::R32Uint)),
             depth: r.image("no depth", ImageSpec::attachment([1, 1], wgpu::TextureFormat::Depth32Float)),
+            windows: Vec::new(),
         }
     }
 

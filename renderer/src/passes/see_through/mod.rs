@@ -152,7 +152,13 @@ fn find(
         depth: depth_attachment(depth.view(), wgpu::LoadOp::Clear(0.0)),
     };
     r.draw_each(&kernels.layer, attachments, each);
-    Seen { view: seen.view.clone(), pixels_per_mm: seen.pixels_per_mm, ids, depth }
+    Seen {
+        view: seen.view.clone(),
+        pixels_per_mm: seen.pixels_per_mm,
+        ids,
+        depth,
+        windows: seen.windows.clone(),
+    }
 }
 
 fn kernels(gpu: &Gpu) -> Kernels {

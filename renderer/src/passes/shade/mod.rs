@@ -85,7 +85,6 @@ use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Image, ImageSpec, Kernel, Recorder, texture};
 use crate::error::RenderError;
 use crate::passes::geometry::raster::Rasteriser;
-use crate::passes::pixel_groups;
 use crate::passes::see_through::Sum;
 use crate::scene::head::AUTHORED_SHIFT;
 use crate::scene::lamp::{GpuLight, Illumination};
@@ -414,7 +413,10 @@ impl Shade {
             ]);
             resources
         };
-        let each = heads.iter().zip(&params).map(|(h, params)| (resources(h, params), pixel_groups(size)));
+        let each = heads
+            .iter()
+            .zip(&params)
+            .map(|(h, params)| (resources(h, params), lighting.seen.groups(h.index)));
         r.dispatch_each(lighting.skin_light.map_or(&self.kernel, SkinLight::kernel), each);
         if heads.iter().all(|h| h.head.authored.is_none()) {
             return lit;
@@ -426,7 +428,7 @@ impl Shade {
             resources.extend(authored.resources());
             resources.push(("authored_data", authored.data.bound()));
             resources.push(("ggx_albedo", kernels.ggx_albedo.bound()));
-            Some((resources, pixel_groups(size)))
+            Some((resources, lighting.seen.groups(h.index)))
         });
         r.dispatch_each(&kernels.opaque, authored);
         lit
@@ -463,7 +465,7 @@ impl Shade {
                 ("sum_radiance_out", sum.radiance.bound()),
                 ("sum_share_out", sum.share.bound()),
             ]);
-            Some((resources, pixel_groups(size)))
+            Some((resources, lighting.seen.groups(h.index)))
         });
         r.dispatch_each(&kernels.layer, each);
         sum

@@ -429,7 +429,7 @@ impl Diffusion for DipoleCubemap {
                 ("far", own.smoothed.bound()),
                 ("scattered", scattered.bound()),
             ];
-            (resources, pixel_groups(size))
+            (resources, seen.groups(head.index))
         });
         r.dispatch_each(&self.combine, each);
         // Without a head nothing scatters, and nobody wrote the picture.

@@ -1,7 +1,8 @@
 //! Curvature of the points of deformed heads.
 //!
 //! ```text
-//! positions, normals, triangles around each point --curvature_of_points--> rough --smooth_curvature, twice--> curvature
+//! triangles around each point --list_spokes, once a head--> points and vertices around each point
+//! positions, normals, spokes --curvature_of_points--> rough --smooth_curvature, twice--> curvature
 //! ```
 //!
 //! Theory: differences of the smooth normals over the edges around a point, least squares for the symmetric matrix of the
@@ -25,8 +26,12 @@ pub(super) fn program() -> Program {
 /// Bytes of a tensor.
 const TENSOR_BYTES: u64 = 32;
 
+/// Bytes of the points and vertices of two neighbours.
+const SPOKE_BYTES: u64 = 16;
+
 /// The pipelines.
 pub(super) struct Curvature {
+    list: Kernel,
     points: Kernel,
     smooth: Kernel,
 }
@@ -35,17 +40,16 @@ pub(super) struct Curvature {
 pub(super) struct Curvatures {
     /// The last pass writes the first.
     buffers: [wgpu::Buffer; 2],
+    spokes: wgpu::Buffer,
+    hubs: wgpu::Buffer,
+    /// That of the head.
+    ring: wgpu::Buffer,
 }
 
 impl Curvatures {
-    pub(super) fn new(gpu: &Gpu, head: &PosedHead<'_>) -> Self {
-        let bytes = TENSOR_BYTES * u64::from(head.head.point_count);
-        Self { buffers: ["curvature", "rough curvature"].map(|label| gpu.storage_zeroed(label, bytes)) }
-    }
-
-    /// Whether there is one tensor for each point.
+    /// Whether they are those of this head.
     pub(super) fn fit(&self, head: &PosedHead<'_>) -> bool {
-        self.buffers[0].size() == TENSOR_BYTES * u64::from(head.head.point_count)
+        self.ring == head.head.ring
     }
 
     /// The result.
@@ -54,14 +58,41 @@ impl Curvatures {
     }
 
     pub(super) fn bytes(&self) -> u64 {
-        self.buffers.iter().map(wgpu::Buffer::size).sum()
+        self.buffers.iter().chain([&self.spokes, &self.hubs]).map(wgpu::Buffer::size).sum()
     }
 }
 
 impl Curvature {
     pub(super) fn new(gpu: &Gpu) -> Self {
         let kernel = |entry| Kernel::new(gpu, "scatter curvature", &program(), entry);
-        Self { points: kernel("curvature_of_points"), smooth: kernel("smooth_curvature") }
+        Self {
+            list: Kernel::new(gpu, "list spokes", &program(), "list_spokes"),
+            points: kernel("curvature_of_points"),
+            smooth: kernel("smooth_curvature"),
+        }
+    }
+
+    /// What a head needs.
+    pub(super) fn prepare(&self, r: &mut Recorder<'_>, head: &PosedHead<'_>) -> Curvatures {
+        let points = u64::from(head.head.point_count);
+        let spokes = SPOKE_BYTES * (head.head.ring.size() / 4);
+        let made = Curvatures {
+            buffers: ["curvature", "rough curvature"]
+                .map(|label| r.gpu.storage_zeroed(label, TENSOR_BYTES * points)),
+            spokes: r.gpu.storage_zeroed("spokes", spokes),
+            hubs: r.gpu.storage_zeroed("hubs", 4 * points),
+            ring: head.head.ring.clone(),
+        };
+        let resources = vec![
+            ("vertices", head.head.vertices.bound()),
+            ("triangles", head.head.triangles.bound()),
+            ("ring_starts", head.head.ring_starts.bound()),
+            ("ring", head.head.ring.bound()),
+            ("spokes_out", made.spokes.bound()),
+            ("hubs_out", made.hubs.bound()),
+        ];
+        r.dispatch_each(&self.list, [(resources, [head.head.point_count.div_ceil(64), 1, 1])]);
+        made
     }
 
     /// Finds the curvature of heads.
@@ -70,11 +101,10 @@ impl Curvature {
             let each = heads.iter().map(|(h, c)| {
                 let resources = vec![
                     ("positions", h.positions.bound()),
-                    ("vertices", h.head.vertices.bound()),
-                    ("triangles", h.head.triangles.bound()),
                     ("frames", h.tangent_frames.bound()),
                     ("ring_starts", h.head.ring_starts.bound()),
-                    ("ring", h.head.ring.bound()),
+                    ("spokes", c.spokes.bound()),
+                    ("hubs", c.hubs.bound()),
                     ("rough", c.buffers[from].bound()),
                     ("curvatures", c.buffers[to].bound()),
                 ];

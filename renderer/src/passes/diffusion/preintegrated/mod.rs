@@ -167,6 +167,9 @@ impl Diffusion for PreIntegrated {
         let program = || program(self.by_channel, on_screen);
         self.kernel = Some(frame.shade.skin_light_kernel(r.gpu, name, program));
         self.heads.truncate(frame.heads.len());
+        if !on_screen {
+            self.curvature.get_or_insert_with(|| Curvature::new(r.gpu));
+        }
         for (i, head) in frame.heads.iter().enumerate() {
             let fits = |p: &Prepared| p.maps.as_ref().map(BlurredMaps::source) == relief::source_of(head);
             if !self.heads.get(i).is_some_and(fits) {
@@ -182,14 +185,15 @@ impl Diffusion for PreIntegrated {
                 self.heads.push(Prepared { maps, curvatures: None, params });
             }
             let prepared = &mut self.heads[i];
-            if on_screen {
-                prepared.curvatures = None;
-            } else if !prepared.curvatures.as_ref().is_some_and(|c| c.fit(head)) {
-                prepared.curvatures = Some(Curvatures::new(r.gpu, head));
-            }
+            prepared.curvatures = match &self.curvature {
+                Some(passes) if !on_screen => {
+                    let kept = prepared.curvatures.take().filter(|c| c.fit(head));
+                    Some(kept.unwrap_or_else(|| passes.prepare(r, head)))
+                }
+                _ => None,
+            };
         }
-        if !on_screen {
-            let passes = self.curvature.get_or_insert_with(|| Curvature::new(r.gpu));
+        if let (Some(passes), false) = (&self.curvature, on_screen) {
             let each: Vec<_> = (frame.heads.iter().zip(&self.heads))
                 .filter_map(|(head, prepared)| Some((head, prepared.curvatures.as_ref()?)))
                 .collect();

@@ -8,7 +8,7 @@ use rubor_rig::skin::diffusion::NormalizedDiffusion;
 use rubor_rig::skin::preintegrated::{Shape, band_shares, disk_edge, scattered_cosine, wave_shares};
 use rubor_rig::skin::profile::{Profile, RadialProfile};
 
-use super::curvature::{Curvature, Curvatures};
+use super::curvature::Curvature;
 use super::reference::{curvatures, principal};
 use super::*;
 use crate::channels::Channel;
@@ -60,7 +60,10 @@ fn shaders_are_valid_and_laid_out_as_in_rust() {
     }
     assert_workgroups(&relief::halve_program(), &[("halve_maps", [8, 8, 1])]);
     let curvature = curvature::program();
-    assert_workgroups(&curvature, &[("curvature_of_points", [64, 1, 1]), ("smooth_curvature", [64, 1, 1])]);
+    assert_workgroups(
+        &curvature,
+        &[("list_spokes", [64, 1, 1]), ("curvature_of_points", [64, 1, 1]), ("smooth_curvature", [64, 1, 1])],
+    );
     // Without the rule nothing of it is in the kernel of other methods.
     let plain = crate::passes::shade::program().link(&["shade"], false).wgsl;
     assert!(!plain.contains("skin_tables") && !plain.contains("ScatteredSkin"));
@@ -120,17 +123,19 @@ fn found_curvatures(head: &Head) -> Option<Vec<DMat3>> {
     let scene = scene(&heads, &[], None, 60.0);
     let instances = [Instance::new(&gpu, &on_gpu)];
     let posed = posed(&scene, &instances, false);
-    let buffers = Curvatures::new(&gpu, &posed[0]);
+    let mut buffers = None;
     recorded(&gpu, |r| {
         Morph::new(&gpu).record(r, &posed);
         TangentFrames::new(&gpu).record(r, &posed);
-        Curvature::new(&gpu).record(r, &[(&posed[0], &buffers)]);
+        let passes = Curvature::new(&gpu);
+        let made = buffers.insert(passes.prepare(r, &posed[0]));
+        passes.record(r, &[(&posed[0], made)]);
     });
     let tensor = |t: &[f32; 8]| {
         let [x, y, z, _, yz, zx, xy, _] = t.map(f64::from);
         DMat3::from_cols_array(&[x, xy, zx, xy, y, yz, zx, yz, z])
     };
-    Some(read_storage::<[f32; 8]>(&gpu, buffers.smooth()).iter().map(tensor).collect())
+    Some(read_storage::<[f32; 8]>(&gpu, buffers.as_ref()?.smooth()).iter().map(tensor).collect())
 }
 
 #[test]

@@ -159,6 +159,7 @@ fn run_with(
         pixels_per_mm: frame.focal_px / farthest,
         ids: depth.clone(),
         depth,
+        windows: Vec::new(),
     };
     let scattered = recorded(gpu, |r| work(r, &seen, &lit));
     read(gpu, &scattered)

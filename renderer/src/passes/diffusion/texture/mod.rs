@@ -54,7 +54,7 @@ use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::pixel_groups;
 use crate::passes::shade::{self, Lit};
 use crate::scene::head::Surface;
-use crate::scene::view::Seen;
+use crate::scene::view::{Seen, nearest_pixel_metres};
 use crate::scene::{HeadInstance, PosedHead};
 use crate::settings::{MapSaving, ScatterMethod, Stage, TransmitMethod};
 use plan::{Plan, plan};
@@ -75,8 +75,6 @@ const REACH: f64 = 3.0;
 const MOST_LEVELS: u32 = 3;
 /// Picture with its border relative to the picture, for shadow maps.
 const PICTURE_MARGIN: f32 = 1.25;
-/// Room around a head at rest for its expressions, metres.
-const ROOM_METRES: f32 = 0.01;
 
 /// The shader that lights maps.
 pub(crate) fn light_program() -> Program {
@@ -226,7 +224,8 @@ impl TextureSpace {
         let is_translucent = frame.quality.transmit == TransmitMethod::TranslucentShadowMap;
         // Light comes from places that face away.
         let culled = if is_translucent { 0 } else { bit(MapSaving::Culled, 1) };
-        let pixel_mm = nearest_pixel_mm(frame, head);
+        let pixel_mm = MM_PER_METRE
+            * nearest_pixel_metres(frame.scene, frame.size, &frame.scene.heads[head.index as usize]);
         let level = if has(MapSaving::Sized) { sized_level(layout.mm_per_texel, pixel_mm) } else { 0 };
         Map {
             layout_side: self.side,
@@ -381,16 +380,6 @@ impl Layout {
     }
 }
 
-/// Width of a pixel on the nearest part of a head, millimetres; 0 where the camera is inside of its box.
-fn nearest_pixel_mm(frame: &Before<'_>, head: &PosedHead<'_>) -> f32 {
-    let (low, high) = head.head.bounds;
-    let camera = head.world_from_head.inverse().transform_point3(frame.scene.camera.position);
-    let distance = camera.distance(camera.clamp(low, high)) - ROOM_METRES;
-    let pixels_per_radian =
-        0.5 * frame.size[1] as f32 / (0.5 * frame.scene.camera.fov_degrees.to_radians()).tan();
-    MM_PER_METRE * distance.max(0.0) / pixels_per_radian
-}
-
 /// Halvings of a map while its texels stay as narrow as a quarter of a pixel (Jimenez 2012 eqs. 3.1 and 3.2, in powers of two).
 fn sized_level(mm_per_texel: f32, pixel_mm: f32) -> u32 {
     let ratio = 0.25 * pixel_mm / mm_per_texel;
@@ -473,7 +462,7 @@ impl Diffusion for TextureSpace {
                 for (i, name) in MAP_NAMES.into_iter().enumerate() {
                     resources.push((name, maps.blurred.get(i).unwrap_or(&maps.light).bound()));
                 }
-                Some((resources, pixel_groups(size)))
+                Some((resources, seen.groups(head.index)))
             })
             .collect();
         r.dispatch_each(&self.gather, each);

@@ -33,9 +33,12 @@ const SHADER: Module = module!("raster", "raster.wesl");
 const RESOLVE_SHADER: Module = module!("raster_resolve", "resolve.wesl");
 
 /// Large triangles of a head that the list holds; with more, each is drawn by one invocation (`raster_rest`).
-const LARGE_CAPACITY: u32 = 4096;
+const LARGE_CAPACITY: u32 = 32768;
 /// Workgroups that share the large triangles of a head.
-const LARGE_GROUPS: u32 = 128;
+const LARGE_GROUPS: u32 = 1024;
+
+/// Rows of pixels of a workgroup of `raster_resolve`.
+const RESOLVED_ROWS: u32 = 32;
 
 /// What draws triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -65,6 +68,18 @@ pub(crate) enum Sight {
     Camera { wide: bool },
     /// Depth of each light.
     Lights,
+}
+
+impl Sight {
+    /// Names of the steps in measurements.
+    fn labels(self) -> [&'static str; 4] {
+        match self {
+            Self::Camera { .. } => {
+                ["visibility", "visibility large", "visibility rest", "visibility resolve"]
+            }
+            Self::Lights => ["shadow", "shadow large", "shadow rest", "shadow resolve"],
+        }
+    }
 }
 
 /// Numbers of a draw.
@@ -123,35 +138,34 @@ pub(crate) struct ComputeRaster {
     /// Where atomics are narrow: those that find ids.
     second: Option<[Option<Fill>; 2]>,
     resolve: Kernel,
-    label: &'static str,
     pixels: wgpu::Buffer,
     nearest: wgpu::Buffer,
     large: wgpu::Buffer,
 }
 
 impl Fill {
-    fn new(gpu: &Gpu, label: &'static str, sight: Sight, cut: bool, second: bool) -> Self {
+    fn new(gpu: &Gpu, sight: Sight, cut: bool, second: bool) -> Self {
         let program = program(sight, cut, second);
+        let [each, large, rest, _] = sight.labels();
         Self {
-            each: Kernel::new(gpu, label, &program, "raster_each"),
-            large: Kernel::new(gpu, label, &program, "raster_large"),
-            rest: Kernel::new(gpu, label, &program, "raster_rest"),
+            each: Kernel::new(gpu, each, &program, "raster_each"),
+            large: Kernel::new(gpu, large, &program, "raster_large"),
+            rest: Kernel::new(gpu, rest, &program, "raster_rest"),
         }
     }
 }
 
 impl ComputeRaster {
     /// The pipelines of a sight, for triangles without holes.
-    pub(crate) fn new(gpu: &Gpu, label: &'static str, sight: Sight) -> Self {
+    pub(crate) fn new(gpu: &Gpu, sight: Sight) -> Self {
         let large = 4 * (MAX_HEADS as u64) * (1 + 2 * u64::from(LARGE_CAPACITY));
         let narrow = sight == Sight::Camera { wide: false };
         Self {
             sight,
-            whole: Fill::new(gpu, label, sight, false, false),
+            whole: Fill::new(gpu, sight, false, false),
             cut: None,
-            second: narrow.then(|| [Some(Fill::new(gpu, label, sight, false, true)), None]),
-            resolve: Kernel::new(gpu, label, &resolve_program(sight), "raster_resolve"),
-            label,
+            second: narrow.then(|| [Some(Fill::new(gpu, sight, false, true)), None]),
+            resolve: Kernel::new(gpu, sight.labels()[3], &resolve_program(sight), "raster_resolve"),
             pixels: gpu.storage_zeroed("keys of pixels", 0),
             nearest: gpu.storage_zeroed("ids of pixels", 0),
             large: gpu.storage_zeroed("large triangles", large),
@@ -177,10 +191,10 @@ impl ComputeRaster {
             self.nearest = gpu.storage_zeroed("ids of pixels", bytes);
         }
         if has_holes {
-            let (label, sight) = (self.label, self.sight);
-            self.cut.get_or_insert_with(|| Fill::new(gpu, label, sight, true, false));
+            let sight = self.sight;
+            self.cut.get_or_insert_with(|| Fill::new(gpu, sight, true, false));
             if let Some([_, cut]) = &mut self.second {
-                cut.get_or_insert_with(|| Fill::new(gpu, label, sight, true, true));
+                cut.get_or_insert_with(|| Fill::new(gpu, sight, true, true));
             }
         }
     }
@@ -308,6 +322,6 @@ impl ComputeRaster {
             ("nearest", self.nearest.bound()),
         ];
         resources.extend(out.iter().cloned());
-        r.dispatch(&self.resolve, &resources, [size[0].div_ceil(8), size[1].div_ceil(8), layers]);
+        r.dispatch(&self.resolve, &resources, [size[0].div_ceil(8), size[1].div_ceil(RESOLVED_ROWS), layers]);
     }
 }

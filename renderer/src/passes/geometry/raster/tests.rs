@@ -27,7 +27,7 @@ fn shaders_are_valid_and_their_structs_are_those_of_rust() {
             let program = program(sight, cut, second);
             assert_workgroups(
                 &program,
-                &[("raster_each", [64, 1, 1]), ("raster_large", [256, 1, 1]), ("raster_rest", [64, 1, 1])],
+                &[("raster_each", [64, 1, 1]), ("raster_large", [64, 1, 1]), ("raster_rest", [64, 1, 1])],
             );
         }
         assert_workgroups(&resolve_program(sight), &[("raster_resolve", [8, 8, 1])]);

@@ -45,7 +45,7 @@ impl Shadow {
     pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
         match rasteriser {
             Rasteriser::Hardware => Self::Hardware(Hardware::new(gpu)),
-            Rasteriser::Compute { .. } => Self::Compute(ComputeRaster::new(gpu, "shadow", Sight::Lights)),
+            Rasteriser::Compute { .. } => Self::Compute(ComputeRaster::new(gpu, Sight::Lights)),
         }
     }
 

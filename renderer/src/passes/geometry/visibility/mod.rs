@@ -55,9 +55,7 @@ impl Visibility {
     pub(crate) fn new(gpu: &Gpu, rasteriser: Rasteriser) -> Self {
         match rasteriser {
             Rasteriser::Hardware => Self::Hardware(Hardware::new(gpu)),
-            Rasteriser::Compute { wide } => {
-                Self::Compute(ComputeRaster::new(gpu, "visibility", Sight::Camera { wide }))
-            }
+            Rasteriser::Compute { wide } => Self::Compute(ComputeRaster::new(gpu, Sight::Camera { wide })),
         }
     }
 

@@ -7,7 +7,7 @@ use super::*;
 use crate::channels::Channel;
 use crate::scene::hair_roots::{self, Root};
 use crate::settings::AntialiasMethod;
-use crate::testing::{assert_layout, assert_raster, offsets};
+use crate::testing::{assert_layout, assert_raster, assert_workgroups, offsets};
 use crate::tests::{WHITE_TABLE, dome, lamp, read, render, renderer, settings};
 use crate::{Camera, HeadInstance, HeadOnGpu, Scene};
 
@@ -25,8 +25,15 @@ fn half_haired() -> (rubor_rig::head::Head, Vec<[u32; 4]>) {
 #[test]
 fn shader_is_valid_and_laid_out_as_here() {
     assert_raster(&program(), &["cropped_hair_vertex", "cropped_hair_fragment"]);
-    let entry = "cropped_hair_vertex";
-    assert_layout(&program(), entry, "Params", size_of::<Params>(), &offsets!(Params; color as "color"));
+    let entry = "light_hairs";
+    assert_workgroups(&program(), &[(entry, [64, 1, 1])]);
+    assert_layout(
+        &program(),
+        entry,
+        "Params",
+        size_of::<Params>(),
+        &offsets!(Params; color as "color", count as "count", share as "share"),
+    );
     assert_layout(
         &program(),
         entry,
@@ -135,4 +142,58 @@ fn a_hair_moves_with_its_root() {
     assert!(hairs > 200 && full > hairs / 2, "{hairs} pixels of hair, {full} with all of the motion");
     // A tip three millimetres out would move by 4 % more.
     assert!(farthest_mm > 3.0, "hair up to {farthest_mm} mm");
+}
+
+#[test]
+fn the_first_hairs_stand_for_all() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let state = FaceState::neutral(&head);
+    let heads = [HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }];
+    // A pixel is 2 mm, 14 times a hair.
+    let scene = Scene {
+        heads: &heads,
+        camera: Camera { position: 2.0 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 5.5 },
+        lights: &[lamp()],
+        environment: None,
+        environment_rotation: 0.0,
+        environment_intensity: 0.0,
+        background_linear: Vec3::ZERO,
+    };
+    let mut of = |detail| {
+        let mut settings = settings([96; 2]);
+        settings.quality.detail = detail;
+        render(&mut renderer, &scene, &settings).expect("it draws");
+        read(&renderer, Channel::Radiance).texels::<4>().collect::<Vec<_>>()
+    };
+    let (all, some) = (of(DetailMethod::Full), of(DetailMethod::Auto));
+    assert!(drawn_hairs(on_gpu.hair_root_count, 0.002) < on_gpu.hair_root_count / 3);
+    // Single hairs are a matter of chance; the eye and the filter see a few pixels at once.
+    let blocks = |picture: &[[f32; 4]]| -> Vec<f64> {
+        let at = |x: usize, y: usize| f64::from(picture[y * 96 + x][1]);
+        let block =
+            |b: usize| (0..64).map(|i| at(8 * (b % 12) + i % 8, 8 * (b / 12) + i / 8)).sum::<f64>() / 64.0;
+        (0..144).map(block).collect()
+    };
+    let (all, some) = (blocks(&all), blocks(&some));
+    let mean = |blocks: &[f64]| blocks.iter().sum::<f64>() / blocks.len() as f64;
+    let apart = all.iter().zip(&some).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / all.len() as f64;
+    assert!((mean(&some) / mean(&all) - 1.0).abs() < 0.02, "{} and {}", mean(&some), mean(&all));
+    assert!(apart.sqrt() < 0.1 * mean(&all), "{} of {}", apart.sqrt(), mean(&all));
+}
+
+#[test]
+fn hairs_come_one_by_one_and_all_are_drawn_near_by() {
+    assert_eq!(drawn_hairs(1000, 0.0), 1000);
+    assert_eq!(drawn_hairs(1000, 0.0004), 1000);
+    let mut last = 1000;
+    for i in 0..20_000 {
+        let now = drawn_hairs(1000, 0.0005 + 0.0000005 * i as f32);
+        assert!(now >= 1 && now <= last && last - now <= 2, "{last} {now}");
+        last = now;
+    }
+    assert!(last < 60, "{last}");
+    assert_eq!(drawn_hairs(7, f32::MAX), 1);
 }

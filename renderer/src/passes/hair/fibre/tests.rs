@@ -34,7 +34,7 @@ const BROWN: [f64; 3] = [0.0186, 0.0115, 0.0066];
 fn the_light_of_hair_is_laid_out_alike_on_both_sides() {
     assert_layout(
         &crate::passes::hair::cropped_hair::program(),
-        "cropped_hair_vertex",
+        "light_hairs",
         "HairLight",
         size_of::<HairLight>(),
         &offsets!(HairLight; environment_intensity as "environment_intensity",
