@@ -19,12 +19,9 @@ fn obj_cases() -> Vec<Case> {
         &["check", "{}/a.obj"],
         format!("{TRIANGLE}{}", "f 1/1 2/2 3/3\n".repeat(40)).as_bytes(),
     );
-    all.push(
-        obj("groups-100000", || {
-            TRIANGLE.to_owned() + &repeated(|i| format!("g g{i}\nf 1/1 2/2 3/3\n"), 100_000)
-        })
-        .small(),
-    );
+    all.push(obj("groups-100000", || {
+        TRIANGLE.to_owned() + &repeated(|i| format!("g g{i}\nf 1/1 2/2 3/3\n"), 100_000)
+    }));
     all.push(obj("materials-100000", || {
         TRIANGLE.to_owned() + &repeated(|i| format!("usemtl m{i}\nf 1/1 2/2 3/3\n"), 100_000)
     }));
@@ -131,9 +128,7 @@ fn usd_cases() -> Vec<Case> {
     let mut all =
         truncated("usda", "a.usda", &["check", "{}/a.usda"], format!("{USD}{}", mesh("face")).as_bytes());
     all.push(usd_check("plain", || mesh("a")));
-    all.push(
-        usd_check("prims-100000", || repeated(|i| format!("def Scope \"s{i}\" {{ }}\n"), 100_000)).small(),
-    );
+    all.push(usd_check("prims-100000", || repeated(|i| format!("def Scope \"s{i}\" {{ }}\n"), 100_000)));
     all.push(usd_check("meshes-100000", || repeated(|i| mesh(&format!("m{i}")), 100_000)));
     all.push(usd("prims-100000", || {
         repeated(|i| format!("def Scope \"s{i}\" {{ }}\n"), 100_000) + &mesh("a")
@@ -213,12 +208,9 @@ fn maya_cases() -> Vec<Case> {
     let mut all =
         truncated("ma", "a.ma", &["check", "{}/a.ma"], format!("{MAYA}{node}{attribute}").as_bytes());
     all.push(maya("plain", move || format!("{node}{attribute}")));
-    all.push(
-        maya("requires-100000", move || {
-            repeated(|i| format!("requires \"plugin{i}\" \"1\";\n"), 100_000) + node + attribute
-        })
-        .small(),
-    );
+    all.push(maya("requires-100000", move || {
+        repeated(|i| format!("requires \"plugin{i}\" \"1\";\n"), 100_000) + node + attribute
+    }));
     all.push(maya("nodes-100000", || repeated(|i| format!("createNode transform -n \"t{i}\";\n"), 100_000)));
     all.push(maya("nodes-of-one-name-100000", || "createNode transform -n \"t\";\n".repeat(100_000)));
     all.push(maya("levels-100000", || {
