@@ -19,6 +19,7 @@ mod expressions;
 mod face_space;
 mod lines;
 mod noise;
+mod own_folds;
 mod own_hair;
 mod regions;
 mod relief;
@@ -364,7 +365,9 @@ fn complete(head: &mut Head, options: &Options, step: &(dyn Fn() + Sync)) -> Res
         };
         head.maps.distributions = from.distributions.iter().filter_map(followed).collect();
         head.maps.wrinkle_slopes = from.wrinkle_slopes;
-        head.maps.zones = from.zones;
+        let mut zones = from.zones;
+        own_folds::fade_zones(head, &mut zones);
+        head.maps.zones = zones;
         made.extend(["wrinkle_slopes", "zones"]);
         if own.slopes.is_none() {
             head.maps.slopes = from.slopes;
