@@ -57,7 +57,8 @@ fn shortest_stretch(head: &Head, moved: &[Vec3]) -> Vec<f32> {
         let stretch = stretch(rest, t.map(|p| moved[p]));
         t.iter().for_each(|p| sums[*p] = (sums[*p].0 + area * stretch, sums[*p].1 + area));
     }
-    let of_points: Vec<f32> = sums.iter().map(|(sum, area)| if *area > 0.0 { sum / area } else { 1.0 }).collect();
+    let of_points: Vec<f32> =
+        sums.iter().map(|(sum, area)| if *area > 0.0 { sum / area } else { 1.0 }).collect();
     // Grooves are wider than a triangle.
     let mut wide: Vec<(f32, f32)> = of_points.iter().map(|s| (*s, 1.0)).collect();
     for t in &corners {
@@ -115,11 +116,8 @@ mod tests {
             points: points.collect(),
             ..BlendShape::default()
         }];
-        let zone = |name: &str| WrinkleZone {
-            name: name.into(),
-            wrinkle_map: 0,
-            mask: Map::filled(4, 4, &[1.0]),
-        };
+        let zone =
+            |name: &str| WrinkleZone { name: name.into(), wrinkle_map: 0, mask: Map::filled(4, 4, &[1.0]) };
         let mut zones = [zone("nasolabial-left"), zone("nasolabial-right"), zone("chin")];
         fade_zones(&head, &mut zones);
         assert!(zones[0].mask.values.iter().all(|v| *v == 0.0));

@@ -45,9 +45,7 @@ pub fn lint(bytes: &[u8], path: &Path) -> Result<Vec<Finding>, ImportError> {
         findings.push(Finding::note("skins", message).fix("bake jaw and eye joints into morph targets"));
     }
     let mut notes = notes.into_vec();
-    if !is_own
-        && let Ok(imported) = super::from_bytes(bytes, path)
-    {
+    if !is_own && let Ok(imported) = super::from_bytes(bytes, path) {
         let new = |n: &crate::notes::Note| notes.iter().all(|known| known.message != n.message);
         let more: Vec<_> = imported.notes.into_iter().filter(new).collect();
         notes.extend(more);
