@@ -35,6 +35,9 @@ pub struct FacialAppearance {
     pub point_count: u32,
     /// One a primitive of the mesh, in order.
     pub parts: Vec<PartEntry>,
+    /// NORMAL holds the normals of the author, which lean from those of the geometry; else they are computed from it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub authored_normals: bool,
     /// Accessor: ambient visibility of each point, SCALAR, unsigned short normalized.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub occlusion: Option<u32>,

@@ -8,7 +8,7 @@ use meshoptimizer_rs::Workspace;
 use meshoptimizer_rs::codec::{Filter, Mode, decode_buffer_view};
 use rubor_assets::export::gltf::{MapEncodings, Options, to_bytes};
 use rubor_assets::facial_appearance::NAME;
-use rubor_assets::import::gltf::from_bytes;
+use rubor_assets::import::gltf::{from_bytes, lint};
 use rubor_rig::timeline::Sequence;
 use serde_json::{Value, json};
 
@@ -163,6 +163,17 @@ fn a_head_survives_a_program_that_does_not_know_it() {
     let notes: Vec<String> = back.notes.iter().map(|n| n.to_string()).collect();
     assert!(notes.iter().any(|n| n.contains("dropped by another program")), "{notes:?}");
     assert_eq!(notes.len(), 1, "{notes:?}");
+    // What checks a file says the same of it.
+    let said = |bytes: &[u8]| -> Vec<String> {
+        lint(bytes, Path::new("b.glb")).unwrap().iter().map(|f| f.to_string()).collect()
+    };
+    let copied = said(&through_another_program(&bytes, |_| {}));
+    assert!(!copied.iter().any(|f| f.contains("there is no")), "{copied:?}");
+    assert!(copied.iter().any(|f| f.contains("dropped by another program")), "{copied:?}");
+    let without = through_another_program(&bytes, |json| {
+        json["meshes"][0]["extras"].as_object_mut().unwrap().remove(NAME);
+    });
+    assert!(said(&without).iter().any(|f| f.contains("there is no")));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use glam::Vec3;
+use rubor_assets::export::gltf::{Options, to_bytes};
 use rubor_assets::facial_appearance::{FacialAppearance, MapEntries};
 use rubor_assets::import::gltf::{from_bytes, read};
 use rubor_rig::timeline::{Ease, Sequence, Track};
@@ -55,6 +56,30 @@ fn import(document: &Value) -> Result<rubor_rig::head::Head, String> {
     from_bytes(document.to_string().as_bytes(), Path::new("folder/test.gltf"))
         .map(|i| i.head)
         .map_err(|e| e.to_string())
+}
+
+#[test]
+fn normals_that_the_author_made_stay_and_come_back() {
+    let with = |normal: [f32; 3]| {
+        let mut document = document();
+        let bytes: Vec<u8> = [normal; 6].as_flattened().iter().flat_map(|c| c.to_le_bytes()).collect();
+        let uri = format!("data:application/octet-stream;base64,{}", base64(&bytes));
+        document["buffers"].as_array_mut().unwrap().push(json!({"byteLength": 72, "uri": uri}));
+        document["bufferViews"].as_array_mut().unwrap().push(json!({"buffer": 1, "byteLength": 72}));
+        let accessor = json!({"bufferView": 3, "componentType": 5126, "count": 6, "type": "VEC3"});
+        document["accessors"].as_array_mut().unwrap().push(accessor);
+        document["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(2);
+        import(&document).unwrap()
+    };
+    assert!(with([0.0, 0.0, 1.0]).authored.normals.is_empty(), "those of the geometry");
+    let leaning = Vec3::new(0.6, 0.0, 0.8);
+    let head = with(leaning.to_array());
+    assert_eq!(head.authored.normals.len(), 6);
+    let bytes = to_bytes(&head, &Options::default()).unwrap();
+    let again = from_bytes(&bytes, Path::new("again.glb")).unwrap().head;
+    for normals in [head.authored.normals, again.authored.normals] {
+        assert!(normals.iter().all(|n| n.abs_diff_eq(leaning, 1e-4)), "{normals:?}");
+    }
 }
 
 #[test]

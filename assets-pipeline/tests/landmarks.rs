@@ -146,7 +146,8 @@ fn given_landmarks_are_kept_and_the_others_follow() {
     assert!(median < 3.0 && largest < 6.0, "median {median} mm, {worst} {largest} mm");
     for (text, expected) in [
         ("[1]", "a JSON object"),
-        (r#"{"nose": 1}"#, "one of vertex"),
+        (r#"{"xyzzy": 1}"#, "one of vertex"),
+        (r#"{"pronasal": 1}"#, "did you mean \"pronasale\"?"),
         (r#"{"pronasale": 4000000}"#, "a vertex below"),
         (r#"{"pronasale": "tip"}"#, "a vertex, three coordinates"),
         (r#"{"pronasale": {"pixel": [-4, 3]}}"#, "a pixel of the picture"),

@@ -77,7 +77,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
         "shade",
         "Vertex",
         size_of::<GpuVertex>(),
-        &offsets!(GpuVertex; point as "point", u as "u", v as "v"),
+        &offsets!(GpuVertex; point as "point", u as "u", v as "v", bend as "bend"),
     );
     assert_layout(
         &shade::authored_program(),
@@ -400,23 +400,46 @@ fn the_scale_of_the_texture_is_that_of_the_skin() {
 
 #[test]
 fn normals_and_tangents_are_those_of_the_cpu_on_both_sides_of_a_seam() {
+    frames_are_those_of_the_cpu(&dome(), 1e-4);
+}
+
+#[test]
+fn normals_of_an_author_lean_as_on_the_cpu() {
+    let mut head = dome();
+    let rest = deform::point_normals(&head.mesh, &head.mesh.points);
+    let lean = |i: usize| Vec3::new((i as f32).sin(), (1.7 * i as f32).cos(), 0.4);
+    let vertices = head.mesh.vertices.iter().enumerate();
+    head.authored.normals = vertices
+        .map(
+            |(i, v)| {
+                if i % 3 == 0 { Vec3::ZERO } else { (rest[v.point as usize] + 0.6 * lean(i)).normalize() }
+            },
+        )
+        .collect();
+    // Slopes are half floats.
+    frames_are_those_of_the_cpu(&head, 1e-3);
+}
+
+fn frames_are_those_of_the_cpu(head: &Head, bound: f32) {
     let Some(mut renderer) = renderer() else { return };
-    let head = dome();
-    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
-    let mut state = FaceState::neutral(&head);
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), head, &WHITE_TABLE).expect("the dome uploads");
+    let mut state = FaceState::neutral(head);
     state.shapes = vec![0.5, 1.0];
     draw(&mut renderer, &on_gpu, &state, &[], &settings([16, 16])).expect("it draws");
     let frames: Vec<[f32; 7]> = read(&renderer, Channel::TangentFrames).texels().collect();
     let points = deform::deform_points(&head.mesh, &head.shapes, &state.shapes);
     let normals = deform::point_normals(&head.mesh, &points);
     let tangents = deform::vertex_tangents(&head.mesh, &points, &normals);
+    let bends = deform::normal_bends(head);
     let mut used = vec![false; head.mesh.vertices.len()];
     head.mesh.triangles.iter().flatten().for_each(|v| used[*v as usize] = true);
     for (i, vertex) in head.mesh.vertices.iter().enumerate().filter(|(i, _)| used[*i]) {
         let f = frames[i];
         let (normal, tangent) = (Vec3::new(f[0], f[1], f[2]), glam::Vec4::new(f[3], f[4], f[5], f[6]));
-        assert!(normal.abs_diff_eq(normals[vertex.point as usize], 1e-4), "normal {i}");
-        assert!(tangent.abs_diff_eq(tangents[i], 1e-3), "tangent {i}: {tangent} {}", tangents[i]);
+        let bend = bends.get(i).copied().unwrap_or_default();
+        let (n, t) = deform::bent(normals[vertex.point as usize], tangents[i], bend);
+        assert!(normal.abs_diff_eq(n, bound), "normal {i}: {normal} {n}");
+        assert!(tangent.abs_diff_eq(t, 10.0 * bound), "tangent {i}: {tangent} {t}");
     }
 }
 

@@ -4,7 +4,7 @@
 //! nothing else of it. Parts that are skin, eyes and so on may have one too: it is kept until the head is written, so that a
 //! part can be given back its own look.
 
-use glam::{Affine2, Mat2, Vec2};
+use glam::{Affine2, Mat2, Vec2, Vec3};
 
 use crate::head::{Head, Material};
 
@@ -21,6 +21,9 @@ pub struct Authored {
     pub second_uvs: Vec<Vec2>,
     /// Linear Rec. 709 and alpha of each vertex, factors of the base colour. Vertices beyond its end have 1.
     pub colors_linear: Vec<[f32; 4]>,
+    /// Unit normal of each vertex at rest as its author made it, in the space of the head. Those of length 0, and vertices
+    /// beyond its end, have the normal of the geometry ([`crate::deform::normal_bends`]).
+    pub normals: Vec<Vec3>,
 }
 
 /// A picture in memory.
@@ -283,6 +286,11 @@ impl Authored {
         }
     }
 
+    /// Normal of a vertex; zero where the geometry says it.
+    pub fn normal(&self, vertex: u32) -> Vec3 {
+        self.normals.get(vertex as usize).copied().unwrap_or(Vec3::ZERO)
+    }
+
     /// Second texture coordinate of a vertex.
     pub fn second_uv(&self, vertex: u32) -> Vec2 {
         self.second_uvs.get(vertex as usize).copied().unwrap_or(Vec2::ZERO)
@@ -369,6 +377,7 @@ impl Authored {
         for (what, count) in [
             ("second texture coordinates", self.second_uvs.len()),
             ("vertex colours", self.colors_linear.len()),
+            ("normals", self.normals.len()),
         ] {
             if count > vertices {
                 return Err((what.into(), count.to_string(), "at most one per vertex"));
@@ -376,6 +385,10 @@ impl Authored {
         }
         if self.second_uvs.iter().any(|uv| !uv.is_finite()) {
             return Err(("second texture coordinates".into(), "NaN or infinity".into(), "finite numbers"));
+        }
+        let is_unit = |n: &&Vec3| **n == Vec3::ZERO || (n.length() - 1.0).abs() < 0.01;
+        if let Some(n) = self.normals.iter().find(|n| !is_unit(n)) {
+            return Err(("normals".into(), n.to_string(), "length 1, or 0 for none"));
         }
         if let Some(c) = self.colors_linear.iter().flatten().find(|c| !c.is_finite() || **c < 0.0) {
             return Err(("vertex colours".into(), c.to_string(), "finite numbers from 0 on"));
@@ -451,7 +464,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_found() {
         type Break = (&'static str, fn(&mut Authored));
-        let breaks: [Break; 13] = [
+        let breaks: [Break; 14] = [
             ("four bytes per texel", |a| a.images[0].width = 2),
             ("four bytes per texel", |a| a.images[0] = AuthoredImage::default()),
             ("0 to 1", |a| a.materials[0].roughness = f32::NAN),
@@ -465,6 +478,7 @@ mod tests {
             ("an existing material", |a| a.of_parts[0] = Some(1)),
             ("at most one per part", |a| a.of_parts.push(None)),
             ("at most one per vertex", |a| a.second_uvs.push(Vec2::ZERO)),
+            ("at most one per vertex", |a| a.normals.push(Vec3::Z)),
         ];
         for (expected, damage) in breaks {
             let mut head = head();

@@ -5,7 +5,7 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use crate::head::{BlendShape, Mesh};
+use crate::head::{BlendShape, Head, Mesh};
 
 /// Deformed points, metres: rest plus the weighted offsets of every shape.
 ///
@@ -73,6 +73,39 @@ pub fn vertex_tangents(mesh: &Mesh, points: &[Vec3], normals: &[Vec3]) -> Vec<Ve
     mesh.vertices.iter().enumerate().map(frame).collect()
 }
 
+/// Cosine between the normals of author and geometry to which larger angles are reduced, so that a slope says them.
+const LEAST_COSINE: f32 = 0.17;
+
+/// How the normals that the author of a head made lean from those of its geometry at rest: slopes along tangent and bitangent
+/// of each vertex. Empty where there are none. A deformed head has its geometry's normals with the same lean.
+pub fn normal_bends(head: &Head) -> Vec<[f32; 2]> {
+    if head.authored.normals.iter().all(|n| *n == Vec3::ZERO) {
+        return Vec::new();
+    }
+    let mesh = &head.mesh;
+    let normals = point_normals(mesh, &mesh.points);
+    let tangents = vertex_tangents(mesh, &mesh.points, &normals);
+    let bend = |(v, vertex): (usize, &crate::head::Vertex)| {
+        let (n, t) = (normals[vertex.point as usize], tangents[v]);
+        let authored = head.authored.normal(v as u32);
+        let up = authored.dot(n).max(LEAST_COSINE);
+        let across = t.w * n.cross(t.truncate());
+        [authored.dot(t.truncate()) / up, authored.dot(across) / up]
+    };
+    mesh.vertices.iter().enumerate().map(bend).collect()
+}
+
+/// Normal and tangent of a vertex that lean by a slope of [`normal_bends`].
+pub fn bent(normal: Vec3, tangent: Vec4, bend: [f32; 2]) -> (Vec3, Vec4) {
+    if bend == [0.0; 2] {
+        return (normal, tangent);
+    }
+    let along = tangent.truncate();
+    let n = (normal + bend[0] * along + bend[1] * tangent.w * normal.cross(along)).normalize();
+    let t = (along - n * n.dot(along)).try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
+    (n, t.extend(tangent.w))
+}
+
 /// Derivatives of position with respect to u and v over a triangle, times twice its area in texture space
 /// (so that degenerate triangles weigh nothing).
 fn texture_derivatives(p: [Vec3; 3], uv: [Vec2; 3]) -> (Vec3, Vec3) {
@@ -106,6 +139,26 @@ mod tests {
         assert!(normals.iter().all(|n| n.abs_diff_eq(Vec3::Z, 1e-6)));
         let tangents = vertex_tangents(&mesh, &mesh.points, &normals);
         assert!(tangents.iter().all(|t| t.abs_diff_eq(Vec4::new(1.0, 0.0, 0.0, 1.0), 1e-6)), "{tangents:?}");
+    }
+
+    #[test]
+    fn normals_of_the_author_lean_as_they_did_at_rest() {
+        let mut head = Head { mesh: square(), ..Head::default() };
+        assert!(normal_bends(&head).is_empty());
+        let leaning = Vec3::new(0.6, 0.0, 0.8);
+        head.authored.normals = vec![leaning, Vec3::ZERO, -Vec3::Z];
+        let bends = normal_bends(&head);
+        assert_eq!(bends[1..], [[0.0; 2]; 3], "what has none, and what has no direction to lean to");
+        let frame = |turn: glam::Quat| {
+            let points: Vec<Vec3> = head.mesh.points.iter().map(|p| turn * *p).collect();
+            let normals = point_normals(&head.mesh, &points);
+            bent(normals[0], vertex_tangents(&head.mesh, &points, &normals)[0], bends[0])
+        };
+        assert!(frame(glam::Quat::IDENTITY).0.abs_diff_eq(leaning, 1e-6));
+        let turn = glam::Quat::from_rotation_y(0.7) * glam::Quat::from_rotation_x(-0.4);
+        let (n, t) = frame(turn);
+        assert!(n.abs_diff_eq(turn * leaning, 1e-6));
+        assert!(t.truncate().abs_diff_eq(turn * Vec3::new(0.8, 0.0, -0.6), 1e-6) && t.w == 1.0);
     }
 
     #[test]

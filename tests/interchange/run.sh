@@ -8,6 +8,7 @@
 # what is missing is said. A step that is named fails where something is missing.
 #
 # CHROMIUM: the browser. BPY_PYTHON, USD_PYTHON: pythons with the packages; made in FOLDER where they are not set.
+# HEADS: files of other programs (.glb) that import and three.js should show alike.
 # RUBOR_ADAPTER: the adapter that draws the pictures of rubor.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -24,6 +25,16 @@ wanted() { case " ${asked:-$1} " in *" $1 "*) return 0 ;; esac; return 1; }
 missing() {
   if [ -n "$asked" ]; then echo "FAILED: $2" >&2; status=1; else echo "SKIPPED: $2"; fi
 }
+
+# Whoever asks for a browser hears at once that there is none.
+chromium=${CHROMIUM:-$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)}
+no_web=
+command -v npm >/dev/null || no_web="validator, three.js and Babylon.js need npm"
+[ -x "$chromium" ] || no_web="three.js and Babylon.js need a Chromium, found none at \"$chromium\" (Debian: apt-get install chromium; or set CHROMIUM)"
+if [ -n "$asked" ] && [ -n "$no_web" ] && wanted web; then
+  missing web "$no_web"
+  exit $status
+fi
 
 cargo build --release --locked -p rubor -p rubor-tests --bins --examples
 target=$(cd "${CARGO_TARGET_DIR:-target}" && pwd)
@@ -62,6 +73,10 @@ web() {
     "$here/pose.sh" "$rubor" "$out" "$pose" || failed=1
   done
   node "$here/viewer.mjs" "$out/compressed.glb" "$out" || failed=1
+  # Heads of other programs, if any are given, beside plain three.js.
+  for head in ${HEADS:-}; do
+    "$here/look.sh" "$rubor" "$examples/interchange_shot" "$out" "look-$(basename "${head%.*}")" "$head" --scale 1 || failed=1
+  done
   # Programs that do not know the extension.
   npx --no-install gltf-transform copy "$out/demo.glb" "$out/copied.glb" || failed=1
   "$rubor" check "$out/copied.glb" || failed=1
@@ -69,12 +84,10 @@ web() {
   [ -z "${failed:-}" ]
 }
 if wanted web; then
-  if ! command -v npm >/dev/null; then missing web "validator, three.js and Babylon.js need npm"
-  elif ! chromium=${CHROMIUM:-$(command -v chromium || command -v chromium-browser || command -v google-chrome)}; then
-    missing web "three.js and Babylon.js need a Chromium (Debian: apt-get install chromium; or set CHROMIUM)"
+  if [ -n "$no_web" ]; then
+    missing web "$no_web"
   else
-    CHROMIUM=$chromium
-    export CHROMIUM
+    export CHROMIUM="$chromium"
     web || status=1
   fi
 fi

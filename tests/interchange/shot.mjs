@@ -3,8 +3,8 @@
 //   shot.mjs HEAD.glb SHOT.json PICTURE.png [--size W,H] [--plain] [--weights '{"joy": 1}'] [--time SECONDS]
 //            [--over OTHER.png]
 //
-// --over: behind the head stands another picture, such as rubor's, so that a comparison counts the head alone. The share of
-// the picture that the head covers is printed: FLIP over the head is the mean of `rubor compare` divided by it.
+// --over: behind the head stands the background of another picture, such as rubor's: one colour, that of its corner. The share of
+// the picture that the head covers is printed, so that a comparison counts the head alone: FLIP over the head is the mean of `rubor compare` divided by it.
 //
 // --plain: as viewers show it that do not know RUBOR_facial_appearance; without it docs/three.js draws blood and wrinkles.
 // Lights are directional lamps without shadow; there is no environment and no tone map.

@@ -32,6 +32,7 @@ pub fn retain(head: &mut Head, keep: impl Fn(usize) -> bool) -> Dropped {
     let of_parts = std::mem::take(&mut authored.of_parts);
     let (second_uvs, colors) =
         (std::mem::take(&mut authored.second_uvs), std::mem::take(&mut authored.colors_linear));
+    let normals = std::mem::take(&mut authored.normals);
     let mut new_point = vec![NONE; old.points.len()];
     let mut new_vertex = vec![NONE; old.vertices.len()];
     let mesh = &mut head.mesh;
@@ -56,6 +57,9 @@ pub fn retain(head: &mut Head, keep: impl Fn(usize) -> bool) -> Dropped {
                     mesh.vertices.push(Vertex { point: *new, uv });
                     authored.second_uvs.extend(second_uvs.get(v as usize));
                     authored.colors_linear.extend(colors.get(v as usize));
+                    authored.normals.extend(
+                        (!normals.is_empty()).then(|| normals.get(v as usize).copied().unwrap_or_default()),
+                    );
                 }
                 *vertex
             });

@@ -17,7 +17,7 @@
 
 use std::collections::HashMap;
 
-use glam::{Affine2, IVec2, Vec2};
+use glam::{Affine2, IVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use rubor_rig::authored::{
     AlphaMode, AuthoredImage, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap,
@@ -450,6 +450,11 @@ fn double(head: &mut Head, vertex: u32) -> u32 {
     head.mesh.vertices.push(head.mesh.vertices[vertex as usize]);
     let authored = &mut head.authored;
     let (uv, color) = (authored.second_uv(vertex), authored.color_linear(vertex));
+    if !authored.normals.is_empty() {
+        let normal = authored.normal(vertex);
+        authored.normals.resize(new as usize, Vec3::ZERO);
+        authored.normals.push(normal);
+    }
     if !authored.second_uvs.is_empty() {
         authored.second_uvs.resize(new as usize, Vec2::ZERO);
         authored.second_uvs.push(uv);

@@ -172,12 +172,12 @@ pub fn require_layout(name: &str, data: &Mask, skin: &Mask) -> Result<(), Conver
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
     use rubor_rig::head::{Mesh, Part, Vertex};
 
     /// A square sheet 1 m wide whose texture fills a part of the unit square.
-    pub(in crate::convert) fn sheet(low: Vec2, high: Vec2) -> Head {
+    pub(crate) fn sheet(low: Vec2, high: Vec2) -> Head {
         let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
         let vertices =
             corners.iter().enumerate().map(|(i, c)| Vertex { point: i as u32, uv: low + *c * (high - low) });

@@ -20,6 +20,7 @@ use rubor_rig::color::srgb_decode;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::limits;
 
+use super::materials::recognise;
 use super::picture::{Channel, Gallery};
 use crate::notes::Notes;
 
@@ -252,7 +253,11 @@ impl Library {
         head.authored.images = self.gallery.images;
         for part in &mut head.mesh.parts {
             let Some(material) = self.materials.get(&part.name) else {
-                if !self.materials.is_empty() && missing.insert(part.name.clone()) {
+                // A part of a part, such as a layer of lashes, has the name of the whole before its own.
+                let is_piece = self.materials.keys().any(|whole| {
+                    part.name.strip_prefix(whole.as_str()).is_some_and(|rest| rest.starts_with(' '))
+                });
+                if !self.materials.is_empty() && !is_piece && missing.insert(part.name.clone()) {
                     notes.add("parts whose material is in no file of materials", part.name.as_str());
                 }
                 head.authored.of_parts.push(None);
@@ -273,11 +278,13 @@ impl Library {
 }
 
 /// Textured parts that have a material of rubor keep the look of their author: its own materials take other texture
-/// coordinates, or would lose what is painted.
+/// coordinates, or would lose what is painted. What names say is skin keeps its colour as skin (`convert::own_color`).
 pub(super) fn keep_look(kind: &mut Material, name: &str, authored: &AuthoredMaterial, notes: &mut Notes) {
     let is_textured = authored.base_color_texture.is_some();
-    if is_textured && !matches!(kind, Material::Hidden | Material::Other) {
-        notes.add("textured skin, eyes, teeth, hair and lashes keep the look of their author", name);
+    let is_kept =
+        matches!(kind, Material::Hidden | Material::Other) || recognise(name) == Some(Material::Skin);
+    if is_textured && !is_kept {
+        notes.add("textured eyes, teeth, hair and lashes keep the look of their author", name);
         *kind = Material::Other;
     }
 }

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 
 use glam::{Vec2, Vec3};
 use rubor_rig::head::Head;
+use rubor_rig::names::nearest;
 use serde::Deserialize;
 use thiserror::Error;
 
@@ -55,7 +56,11 @@ pub fn read(text: &str, head: &Head, fit: Option<&Fit>) -> Result<BTreeMap<Strin
     let mut landmarks = BTreeMap::new();
     for (name, value) in places {
         if !known.contains(&name) {
-            return fail(&name, "an unknown name".into(), &format!("one of {}", known.join(", ")));
+            let expected = match nearest(&name, known.iter().map(String::as_str)) {
+                Some(near) => format!("a known name; did you mean {near:?}?"),
+                None => format!("one of {}", known.join(", ")),
+            };
+            return fail(&name, "an unknown name".into(), &expected);
         }
         let found = value.to_string();
         let place = match serde_json::from_value(value) {

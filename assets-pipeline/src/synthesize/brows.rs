@@ -87,14 +87,14 @@ impl Hairs {
         if line < -14.0 || self.scalp <= 0.0 {
             return 0.0;
         }
-        // At forehead and temples the edge wanders and thins out over a centimetre and a half, at the nape a little less;
+        // At forehead and temples the edge wanders and thins out over a centimetre, at the nape a little less;
         // before and behind the ear it is close.
         let soft = smoothstep(2.0, 34.0, place.y).max(0.7 * smoothstep(-40.0, -58.0, place.y));
         let wander = 1.7 * noise(place, 19.0, self.seed ^ 9)
-            + 0.9 * noise(place, 5.0, self.seed ^ 16)
-            + 0.8 * noise(place, 2.2, self.seed ^ 10);
+            + 0.5 * noise(place, 5.0, self.seed ^ 16)
+            + 0.3 * noise(place, 2.2, self.seed ^ 10);
         let height = line + (0.35 + 0.65 * soft) * wander;
-        let edge = smoothstep(-2.5 - 4.0 * soft, 4.5 + 10.5 * soft, height);
+        let edge = smoothstep(-2.5 - 4.0 * soft, 4.5 + 6.5 * soft, height);
         // Cut shorter towards the edge, as clippers leave it.
         let cut = 0.86 + 0.14 * smoothstep(3.0, 26.0, height);
         self.scalp * edge * cut * (1.0 - r.ear)

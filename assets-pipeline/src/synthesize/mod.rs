@@ -19,7 +19,9 @@ mod expressions;
 mod face_space;
 mod lines;
 mod noise;
+mod own_folds;
 mod own_hair;
+mod own_relief;
 mod regions;
 mod relief;
 mod specular;
@@ -344,7 +346,7 @@ pub fn synthesize_into(head: &mut Head, options: &Options) -> Result<(), Synthes
 }
 
 /// Gives skin that has a colour by itself what it lacks: distributions, and where landmarks say where the face is wrinkles
-/// and relief. Its own maps stay; no hair is made, as its colour holds it.
+/// and, if its colour shows none, relief. Its own maps stay; no hair is made, as its colour holds it.
 fn complete(head: &mut Head, options: &Options, step: &(dyn Fn() + Sync)) -> Result<(), SynthesizeError> {
     options.check()?;
     let own = head.maps.clone();
@@ -364,9 +366,16 @@ fn complete(head: &mut Head, options: &Options, step: &(dyn Fn() + Sync)) -> Res
         };
         head.maps.distributions = from.distributions.iter().filter_map(followed).collect();
         head.maps.wrinkle_slopes = from.wrinkle_slopes;
-        head.maps.zones = from.zones;
+        let mut zones = from.zones;
+        own_folds::fade_zones(head, &mut zones);
+        head.maps.zones = zones;
         made.extend(["wrinkle_slopes", "zones"]);
-        if own.slopes.is_none() {
+        let shows_relief = own.albedo.as_ref().is_some_and(|color| {
+            let texel_mm = SkinSurface::new(head, &FaceSpace::fit(head)).texel_mm(color.width);
+            let mask = SkinTexels::new(head, color.width, color.height).mask();
+            own_relief::is_seen_in(color, &mask, texel_mm)
+        });
+        if own.slopes.is_none() && !shows_relief {
             head.maps.slopes = from.slopes;
             made.push("slopes");
         }

@@ -157,7 +157,11 @@ fn a_layer_of_another_program_is_read() {
     let names: Vec<&str> = head.mesh.parts.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["teeth", "Head"]);
     let kinds: Vec<Material> = head.mesh.parts.iter().map(|p| p.material).collect();
-    assert_eq!(kinds, [Material::Other; 2], "textured parts keep their look, subsets inherit it");
+    assert_eq!(
+        kinds,
+        [Material::Other, Material::Skin],
+        "textured parts keep their look, skin as skin; subsets inherit it"
+    );
     assert_eq!(head.authored.of_parts, [Some(0), Some(0)]);
     says(&read, "keep the look of their author", "teeth");
     let vertex = head.mesh.vertices.iter().find(|v| (v.uv - Vec2::new(0.5, 0.75)).length() < 1e-6);

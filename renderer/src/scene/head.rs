@@ -51,7 +51,7 @@ pub(crate) struct GpuVertex {
     pub(crate) point: u32,
     pub(crate) u: f32,
     pub(crate) v: f32,
-    pub(crate) padding: u32,
+    pub(crate) bend: u32,
 }
 
 /// A head that any number of frames can show.
@@ -146,10 +146,16 @@ impl HeadOnGpu {
         let rest: Vec<[f32; 4]> =
             mesh.points.iter().enumerate().map(|(i, p)| p.extend(occlusion(i)).to_array()).collect();
         let (delta_starts, deltas) = gather_deltas(head);
+        let bends = rubor_rig::deform::normal_bends(head);
+        let bend = |vertex: usize| {
+            let bits = |v: f32| u32::from(half::f16::from_f32(v).to_bits());
+            bends.get(vertex).map_or(0, |[x, y]| bits(*x) | bits(*y) << 16)
+        };
         let vertices: Vec<GpuVertex> = mesh
             .vertices
             .iter()
-            .map(|v| GpuVertex { point: v.point, u: v.uv.x, v: v.uv.y, padding: 0 })
+            .enumerate()
+            .map(|(i, v)| GpuVertex { point: v.point, u: v.uv.x, v: v.uv.y, bend: bend(i) })
             .collect();
         let (triangles, [opaque, cut, see_through, overlay]) = ordered_triangles(head);
         let corners = triangles[..opaque as usize].iter().flat_map(|t| &t[..3]);

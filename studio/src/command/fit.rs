@@ -101,10 +101,11 @@ impl Fit {
         Ok(())
     }
 
-    /// Crops, scales and turns as the user says; says what it guesses.
-    pub(crate) fn apply(&self, head: &mut Head, extent: &Extent, read: Read, path: &Path) -> Outcome {
+    /// Crops, scales and turns as the user says; says what it guesses. True where the size is a guess by the height alone.
+    pub(crate) fn apply(&self, head: &mut Head, extent: &Extent, read: Read, path: &Path) -> Outcome<bool> {
         let note = |text: String| console::notes(&[Note::new(path.display().to_string(), text)]);
         let mut head_share = &extent.head_share[..];
+        let mut is_guess = false;
         if self.crop_head {
             let Some((by, dropped)) = crop::to_head(head, &extent.head_share) else {
                 let found = "--crop-head: found no joints named head or neck and no shapes of a face";
@@ -131,6 +132,7 @@ impl Fit {
             let height = head.height() / read.metres;
             // In units of the file: the guess is of a number without a unit.
             if size::guess(head, head_share).is_some() {
+                is_guess = true;
                 size::scale(head, 1.0 / read.metres);
                 let guess = size::guess(head, head_share);
                 let factor = guess.as_ref().map_or(1.0, |g| g.factor);
@@ -154,7 +156,7 @@ impl Fit {
         if self.flip_v {
             size::flip_v(head);
         }
-        Ok(())
+        Ok(is_guess)
     }
 }
 

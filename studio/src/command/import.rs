@@ -187,7 +187,9 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
                 if let Some(mesh) = &arguments.mesh {
                     Fit::choose(&mut head, &mut extent, mesh, source)?;
                 }
-                arguments.fit.apply(&mut head, &extent, Read::CENTIMETRES, source)?;
+                if arguments.fit.apply(&mut head, &extent, Read::CENTIMETRES, source)? {
+                    size_by_face(&mut head, &about);
+                }
                 head
             } else {
                 let mut loaded = rubor::inputs::plain_head(Some(source))?;
@@ -195,7 +197,9 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
                 if let Some(mesh) = &arguments.mesh {
                     Fit::choose(&mut loaded.head, &mut loaded.extent, mesh, source)?;
                 }
-                arguments.fit.apply(&mut loaded.head, &loaded.extent, Read::METRES, source)?;
+                if arguments.fit.apply(&mut loaded.head, &loaded.extent, Read::METRES, source)? {
+                    size_by_face(&mut loaded.head, &source.display().to_string());
+                }
                 if let Some(path) = &arguments.sequence {
                     let found = loaded.sequence.as_ref().or(loaded.animation.as_ref());
                     write_sequence(found, source, path)?;
@@ -251,6 +255,25 @@ fn write_sequence(sequence: Option<&Sequence>, source: &Path, path: &Path) -> Ou
     say!("{}: {} frames at {} per second", path.display(), sequence.frame_count(), sequence.fps);
     Ok(())
 }
+
+/// Gives a head whose size was guessed by its height, and whose face then is that of a giant or a doll, an adult's face: a bust
+/// is higher than a head.
+fn size_by_face(head: &mut Head, about: &str) {
+    let Some(fit) = landmarks::find(head).filter(|fit| fit.confidence >= SURE) else { return };
+    let size = fit.size();
+    if (LIKELY_SIZES.0..LIKELY_SIZES.1).contains(&size) {
+        return;
+    }
+    rubor_assets::convert::size::scale(head, 1.0 / size);
+    let height = head.height();
+    let message = format!(
+        "its face would be {size:.2} times as large as an adult's: it gets an adult's size, which makes the whole {height:.3} m high"
+    );
+    console::notes(&[Note::new(about, message)]);
+}
+
+/// Confidence from which a face says how large a head is.
+const SURE: f32 = 0.9;
 
 /// Finds where the face is, unless the head says so itself, and what parts are that no name tells.
 fn place_face(head: &mut Head, common: &Common, about: &str) -> Outcome {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 use rayon::prelude::*;
-use rubor_rig::deform::{deform_points, point_normals, vertex_tangents};
+use rubor_rig::deform::{bent, deform_points, normal_bends, point_normals, vertex_tangents};
 use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange};
 use serde_json::{Value, json};
 
@@ -65,6 +65,7 @@ pub(super) fn primitives(
     let mesh = &head.mesh;
     let normals = point_normals(mesh, &mesh.points);
     let tangents = vertex_tangents(mesh, &mesh.points, &normals);
+    let bends = normal_bends(head);
     let turned: Vec<Vec<(u32, Vec3)>> = (kept.par_iter().filter(|_| options.normals))
         .map(|s| normal_offsets(head, &head.shapes[*s], &normals))
         .collect();
@@ -89,7 +90,12 @@ pub(super) fn primitives(
             points.iter().map(|p| list[*p as usize].to_array()).collect()
         };
         let uvs: Vec<[f32; 2]> = vertices.iter().map(|v| mesh.vertices[*v as usize].uv.to_array()).collect();
-        let tangents: Vec<[f32; 4]> = vertices.iter().map(|v| tangents[*v as usize].to_array()).collect();
+        let frames = vertices.iter().map(|v| {
+            let (normal, v) = (normals[mesh.vertices[*v as usize].point as usize], *v as usize);
+            let (normal, tangent) = bent(normal, tangents[v], bends.get(v).copied().unwrap_or_default());
+            (normal.to_array(), tangent.to_array())
+        });
+        let (leaning, tangents): (Vec<[f32; 3]>, Vec<[f32; 4]>) = frames.unzip();
         let mut vertices_of: HashMap<u32, Vec<u32>> = HashMap::new();
         points.iter().enumerate().for_each(|(v, p)| vertices_of.entry(*p).or_default().push(v as u32));
         let to_vertices = |moved: &mut dyn Iterator<Item = (u32, Vec3)>| {
@@ -102,7 +108,7 @@ pub(super) fn primitives(
         let mut primitive = json!({
             "attributes": {
                 "POSITION": buffer.floats(&at(&mesh.points), Target::Vertices, true, buffer::POSITION),
-                "NORMAL": buffer.normals(&at(&normals)),
+                "NORMAL": buffer.normals(&leaning),
                 "TANGENT": buffer.tangents(&tangents),
                 "TEXCOORD_0": buffer.floats(&uvs, Target::Vertices, false, buffer::TEXTURE_COORDINATE),
             },

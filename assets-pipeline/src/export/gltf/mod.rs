@@ -181,6 +181,7 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
         mesh: 0,
         point_count: head.mesh.points.len() as u32,
         parts,
+        authored_normals: !head.authored.normals.is_empty(),
         occlusion,
         shape_occlusion,
         landmarks: head.landmarks.iter().map(|(name, p)| (name.clone(), p.to_array())).collect(),

@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::{Mat3, Mat4, Vec2, Vec3};
 use gltf::mesh::Mode;
 use gltf::{Mesh, Node, Primitive, Semantic};
+use rubor_rig::deform::normal_bends;
 use rubor_rig::head::{BlendShape, Head, Material, Part, Vertex};
 
 use super::Extent;
@@ -57,6 +58,10 @@ struct Builder<'a> {
     extent: Extent,
     joints: HeadJoints,
 }
+
+/// Slope between the normal of a vertex and that of its triangles from which files have normals of their own: 2 degrees, more
+/// than programs that weigh triangles otherwise differ by on smooth surfaces.
+const LEAST_LEAN: f32 = 0.035;
 
 /// A tree of nodes is not deeper than this.
 const MOST_LEVELS: usize = 512;
@@ -367,6 +372,12 @@ impl Builder<'_> {
                 shape.points.push(point as u32);
                 shape.offsets.push(*offset);
             }
+        }
+        head.authored.normals = self.corners.iter().map(|c| c.normal).collect();
+        // Most files have those of their geometry.
+        let lean = |[x, y]: &[f32; 2]| x.hypot(*y);
+        if normal_bends(&head).iter().all(|bend| lean(bend) < LEAST_LEAN) {
+            head.authored.normals.clear();
         }
         Foreign { head, shapes, instances: self.instances, extent: self.extent }
     }

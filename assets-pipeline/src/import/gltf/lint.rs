@@ -26,7 +26,9 @@ pub fn lint(bytes: &[u8], path: &Path) -> Result<Vec<Finding>, ImportError> {
     let mut notes = Notes::default();
     let document = Document::load(bytes, path, &mut notes)?;
     let mut findings = Vec::new();
-    if document.gltf.extension_value(NAME).is_none() {
+    // A copy in the extras counts; what import says of it comes with its notes below.
+    let is_own = document.gltf.extension_value(NAME).is_some();
+    if !is_own && super::recovered::extension(&document, &mut Notes::default()).is_none() {
         let message = format!("there is no {NAME}: maps, rig and landmarks are not in this file");
         findings.push(Finding::note("", message).fix("`rubor import` adds them"));
     }
@@ -43,9 +45,7 @@ pub fn lint(bytes: &[u8], path: &Path) -> Result<Vec<Finding>, ImportError> {
         findings.push(Finding::note("skins", message).fix("bake jaw and eye joints into morph targets"));
     }
     let mut notes = notes.into_vec();
-    if document.gltf.extension_value(NAME).is_none()
-        && let Ok(imported) = super::from_bytes(bytes, path)
-    {
+    if !is_own && let Ok(imported) = super::from_bytes(bytes, path) {
         let new = |n: &crate::notes::Note| notes.iter().all(|known| known.message != n.message);
         let more: Vec<_> = imported.notes.into_iter().filter(new).collect();
         notes.extend(more);

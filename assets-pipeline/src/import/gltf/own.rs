@@ -38,7 +38,10 @@ pub(super) fn read(
         .nth(extension.mesh as usize)
         .ok_or_else(|| document.fail(NAME, format!("mesh {}", extension.mesh), "an existing mesh"))?;
     let (mesh, shapes) = geometry(document, &source, &extension)?;
-    let authored = authored(document, &source, &extension, notes)?;
+    let mut authored = authored(document, &source, &extension, notes)?;
+    if extension.authored_normals {
+        authored.normals = normals(document, &source)?;
+    }
     let mut head = Head {
         name: extension.name,
         mesh,
@@ -175,6 +178,27 @@ fn geometry(
         BlendShape { name, points, offsets, ..BlendShape::default() }
     });
     Ok((mesh, shapes.collect()))
+}
+
+/// Normals of all vertices.
+fn normals(document: &Document, source: &gltf::Mesh<'_>) -> Result<Vec<Vec3>, ImportError> {
+    let mut normals = Vec::new();
+    for (i, primitive) in source.primitives().enumerate() {
+        let at = format!("mesh {}, primitive {i}, NORMAL", source.index());
+        let count = primitive.get(&Semantic::Positions).map_or(0, |a| a.count());
+        let accessor =
+            primitive.get(&Semantic::Normals).ok_or_else(|| document.fail(&at, "nothing", "an accessor"))?;
+        let found = accessor::floats::<3>(document, &at, &accessor)?;
+        if found.len() != count {
+            return Err(document.fail(
+                &at,
+                format!("{} elements", found.len()),
+                format!("{count}, one per vertex"),
+            ));
+        }
+        normals.extend(found.into_iter().map(|n| Vec3::from_array(n).normalize_or_zero()));
+    }
+    Ok(normals)
 }
 
 /// Materials of the parts that are drawn in them, and what these read of vertices.

@@ -79,6 +79,7 @@ pub(super) fn turn(document: &Document, head: &mut Head, notes: &mut Notes) {
     let around = |v: &mut Vec3| *v = Vec3::new(-v.x, v.y, -v.z);
     head.mesh.points.iter_mut().for_each(around);
     head.shapes.iter_mut().flat_map(|s| &mut s.offsets).for_each(around);
+    head.authored.normals.iter_mut().for_each(around);
     notes.say("avatars of VRM 0 look along -z: this one was turned around");
 }
 

@@ -8,7 +8,9 @@
 //! orthogonal to the normal (Lengyel 2001). Both are recomputed from the deformed triangles, so they are right for
 //! every weight; the usual blending of the shapes' normals is wrong where two shapes overlap.
 //!
-//! Reference: `rubor_rig::deform::{point_normals, vertex_tangents}`.
+//! Normals that the author of a head made lean from the computed ones as they do at rest: slopes in the frame of each vertex.
+//!
+//! Reference: `rubor_rig::deform::{point_normals, vertex_tangents, normal_bends, bent}`.
 //!
 //! Cost: every vertex reads its ring of about six triangles; the positions stay in cache.
 
