@@ -21,7 +21,6 @@ mod lines;
 mod noise;
 mod own_folds;
 mod own_hair;
-mod own_relief;
 mod regions;
 mod relief;
 mod specular;
@@ -346,7 +345,7 @@ pub fn synthesize_into(head: &mut Head, options: &Options) -> Result<(), Synthes
 }
 
 /// Gives skin that has a colour by itself what it lacks: distributions, and where landmarks say where the face is wrinkles
-/// and, if its colour shows none, relief. Its own maps stay; no hair is made, as its colour holds it.
+/// and relief. Its own maps stay; no hair is made, as its colour holds it.
 fn complete(head: &mut Head, options: &Options, step: &(dyn Fn() + Sync)) -> Result<(), SynthesizeError> {
     options.check()?;
     let own = head.maps.clone();
@@ -370,12 +369,7 @@ fn complete(head: &mut Head, options: &Options, step: &(dyn Fn() + Sync)) -> Res
         own_folds::fade_zones(head, &mut zones);
         head.maps.zones = zones;
         made.extend(["wrinkle_slopes", "zones"]);
-        let shows_relief = own.albedo.as_ref().is_some_and(|color| {
-            let texel_mm = SkinSurface::new(head, &FaceSpace::fit(head)).texel_mm(color.width);
-            let mask = SkinTexels::new(head, color.width, color.height).mask();
-            own_relief::is_seen_in(color, &mask, texel_mm)
-        });
-        if own.slopes.is_none() && !shows_relief {
+        if own.slopes.is_none() {
             head.maps.slopes = from.slopes;
             made.push("slopes");
         }

@@ -24,11 +24,6 @@
 //! uniform sky diffuse and specular light add up to rho(V) + albedo (1 - rho(V)) / (1 - rho(normal)), which is no more
 //! than 1 where the albedo is at most 1 - rho(normal).
 //!
-//! The base colour of a head of another program ([`rubor_rig::head::SkinMaps::albedo`]) is what is left beside the reflection and
-//! enters Lambert's law as it is (glTF 2.0, appendix B), so its skin is lit without the factor 1 / (1 - mean rho), and the light
-//! of the sky and through thin parts is multiplied by 1 - mean rho (`even_share`): lamps and sky agree. Under a lamp straight
-//! ahead this is (1 - rho(normal)) albedo / pi beside glTF's (1 - F) albedo / pi.
-//!
 //! Specular occlusion: the share of the lobe inside the cone of ambient visibility, which leans towards the viewer
 //! (`specular_visibility`; `docs/occlusion.md`); for the environment and for lamps without a shadow map.
 //!

@@ -11,8 +11,6 @@ use super::directional_albedo::{LEAST_SQUARE, scale_and_bias};
 pub(crate) struct Skin {
     /// Linear albedo, as seen from the front.
     pub(crate) albedo: f64,
-    /// Whether that is a base colour of glTF.
-    pub(crate) has_own_color: bool,
     /// Factor of the specular lobe.
     pub(crate) specular: f64,
     /// Beckmann m.
@@ -36,15 +34,13 @@ impl Skin {
     /// Radiance towards a viewer for unit irradiance across the light; all unit vectors.
     ///
     /// f = albedo / pi (1 - rho(L)) (1 - rho(V)) / ((1 - mean rho) (1 - rho(normal)))  +  D F / |L + V|^2
-    /// and without (1 - mean rho) for skin that has a colour by itself
     /// (Kelemen and Szirmay-Kalos 2001, eq. 10 and 11, with Beckmann's D and Schlick's F).
     pub(crate) fn radiance(&self, normal: DVec3, to_light: DVec3, to_viewer: DVec3) -> f64 {
         let cos_light = normal.dot(to_light);
         if cos_light <= 0.0 {
             return 0.0;
         }
-        let even_share = if self.has_own_color { 1.0 - self.mean_reflected() } else { 1.0 };
-        let entering = even_share * (1.0 - self.reflected(cos_light)) / (1.0 - self.mean_reflected());
+        let entering = (1.0 - self.reflected(cos_light)) / (1.0 - self.mean_reflected());
         let leaving = (1.0 - self.reflected(normal.dot(to_viewer))) / (1.0 - self.reflected(1.0));
         let half = to_light + to_viewer;
         let cos_half = normal.dot(half.normalize());

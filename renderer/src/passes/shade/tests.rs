@@ -10,9 +10,9 @@ use rubor_rig::skin::chromophores::{ChromophoreModel, MAX_HEMOGLOBIN, MAX_MELANI
 
 use super::reference;
 use crate::channels::Channel;
-use crate::settings::{ScatterMethod, SpecularMethod, TransmitMethod};
+use crate::settings::{ScatterMethod, TransmitMethod};
 use crate::tests::{
-    WHITE_TABLE, dome, draw, read, read_texels, read_vectors, render, renderer, seen_surface, settings,
+    WHITE_TABLE, dome, read, read_texels, read_vectors, render, renderer, seen_surface, settings,
 };
 use crate::{Camera, ColorTable, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
@@ -153,29 +153,16 @@ pub(super) fn largest_error(
 #[test]
 fn a_lamp_on_bare_skin_is_the_equation() {
     let Some(mut renderer) = renderer() else { return };
-    let (specular, roughness) = (0.7f32, 0.34f32);
-    let skin = reference::Skin {
-        albedo: 0.8,
-        has_own_color: false,
-        specular: f64::from(specular),
-        roughness: f64::from(roughness),
-    };
     let mut head = dome();
+    let (specular, roughness) = (0.7f32, 0.34f32);
     head.maps.slopes = None;
     head.maps.hair = None;
     head.maps.specular = Some(Map::filled(1, 1, &[specular, roughness]));
     head.mesh.occlusion.clear();
-    lamps_are_the_equation(&mut renderer, &head, &skin);
-    // A base colour of glTF that 8 bits hold.
-    let base = srgb_decode(230.0 / 255.0);
-    head.maps.albedo = Some(Map::filled(4, 4, &[base; 3]));
-    let own = reference::Skin { albedo: f64::from(base), has_own_color: true, ..skin };
-    lamps_are_the_equation(&mut renderer, &head, &own);
-}
-
-fn lamps_are_the_equation(renderer: &mut Renderer, head: &Head, skin: &reference::Skin) {
-    let on_gpu = HeadOnGpu::new(renderer.gpu(), head, &WHITE_TABLE).expect("it uploads");
-    let state = FaceState::neutral(head);
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("it uploads");
+    let skin =
+        reference::Skin { albedo: 0.8, specular: f64::from(specular), roughness: f64::from(roughness) };
+    let state = FaceState::neutral(&head);
     let size = 45;
     let mut settings = settings([size; 2]);
     settings.quality.scatter = ScatterMethod::None;
@@ -193,40 +180,12 @@ fn lamps_are_the_equation(renderer: &mut Renderer, head: &Head, skin: &reference
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
         };
-        render(renderer, &scene, &settings).expect("it draws");
+        render(&mut renderer, &scene, &settings).expect("it draws");
         let (compared, largest) =
-            largest_error(renderer, head, &camera, size, &lamp, |n, l, v| skin.radiance(n, l, v));
+            largest_error(&renderer, &head, &camera, size, &lamp, |n, l, v| skin.radiance(n, l, v));
         // The table of reflected shares is linear between 32 cosines and 32 roughnesses; halves keep 11 bits.
         assert!(compared > 200 && largest < 0.01, "{direction}: {compared} pixels, error up to {largest}");
     }
-}
-
-#[test]
-fn an_even_sky_on_a_base_colour_is_the_sum_of_its_lamps() {
-    let Some(mut renderer) = renderer() else { return };
-    let base = srgb_decode(230.0 / 255.0);
-    let mut head = dome();
-    head.maps.albedo = Some(Map::filled(4, 4, &[base; 3]));
-    let skin = reference::Skin { albedo: f64::from(base), has_own_color: true, specular: 0.5, roughness: 0.3 };
-    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("it uploads");
-    let mut settings = settings([33; 2]);
-    settings.quality.specular = SpecularMethod::OneLobe;
-    settings.quality.scatter = ScatterMethod::None;
-    settings.quality.transmit = TransmitMethod::None;
-    draw(&mut renderer, &on_gpu, &FaceState::neutral(&head), &[], &settings).expect("it draws");
-    // The sky of `draw` has a radiance of 0.5.
-    let found = 2.0 * f64::from(read_texels(&renderer, Channel::Radiance)[16 * 33 + 16][1]);
-    let rings = 100;
-    let polar = (0..rings).map(|i| std::f64::consts::FRAC_PI_2 * (f64::from(i) + 0.5) / f64::from(rings));
-    // Lamps on rings about the normal, by solid angle.
-    let expected: f64 = polar
-        .map(|t| {
-            let solid_angle = std::f64::consts::PI.powi(2) / f64::from(rings) * t.sin();
-            solid_angle * skin.radiance(DVec3::Z, DVec3::new(t.sin(), 0.0, t.cos()), DVec3::Z)
-        })
-        .sum();
-    assert!((found - expected).abs() < 0.006, "{found} for {expected}");
-    assert!(expected < f64::from(base), "some of it is reflected: {expected}");
 }
 
 /// A sheet that fills the picture of a camera far away, its texture once across: a texel is a pixel.
