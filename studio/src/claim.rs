@@ -4,6 +4,7 @@
 //! look   lock if the folder is there; resumed: its job.json must draw the same pixels
 //! take   with the first frame, so that a job that cannot be drawn leaves nothing and spoils nothing:
 //!        lock --> leftovers of killed runs go --> new run: results of the one before go --> job.json
+//!        (those of the same job stay where only some frames are drawn)
 //! drop   the lock goes
 //! ```
 //!
@@ -33,6 +34,8 @@ pub(crate) struct Claim<'a> {
     folder: &'a Path,
     /// All frames are drawn: none of those in the folder is kept.
     pub(crate) is_new: bool,
+    /// The other frames in the folder are of the same job.
+    keeps_others: bool,
     /// The job that the folder has to hold before the first frame.
     to_write: Option<Cow<'a, Job>>,
     /// What killed runs left is gone.
@@ -48,17 +51,26 @@ impl<'a> Claim<'a> {
     pub(crate) fn look(job: &'a Job, folder: &'a Path, resume: bool) -> Outcome<Self> {
         let lock = if folder.is_dir() { Some(Lock::take(folder)?) } else { None };
         let path = folder.join(JOB_FILE);
-        if !resume || !path.is_file() {
-            return Ok(Self {
-                folder,
-                is_new: true,
-                to_write: Some(Cow::Borrowed(job)),
-                is_clean: false,
-                lock,
-            });
+        let whole = |lock| Self {
+            folder,
+            is_new: true,
+            keeps_others: false,
+            to_write: Some(Cow::Borrowed(job)),
+            is_clean: false,
+            lock,
+        };
+        if !path.is_file() || (!resume && job.frames.is_none()) {
+            return Ok(whole(lock));
         }
-        let before = Job::read(&path, None)?;
+        let before = match Job::read(&path, None) {
+            Ok(before) => before,
+            Err(_) if !resume => return Ok(whole(lock)),
+            Err(failure) => return Err(failure),
+        };
         if !before.draws_like(job)? {
+            if !resume {
+                return Ok(whole(lock));
+            }
             return Err(Failure::input(format!(
                 "{}: found the frames of another job, expected those of this one",
                 folder.display()
@@ -68,7 +80,7 @@ impl<'a> Claim<'a> {
         let both =
             before.frames.as_ref().zip(job.frames.as_ref()).map(|(a, b): (&FrameList, &FrameList)| a.and(b));
         let to_write = (both != before.frames).then(|| Cow::Owned(Job { frames: both, ..job.clone() }));
-        Ok(Self { folder, is_new: false, to_write, is_clean: false, lock })
+        Ok(Self { folder, is_new: !resume, keeps_others: true, to_write, is_clean: false, lock })
     }
 
     /// Makes the folder that of the job; later calls do nothing. Returns what there is to say.
@@ -85,7 +97,7 @@ impl<'a> Claim<'a> {
         }
         let Some(job) = self.to_write.take() else { return Ok(None) };
         let mut note = None;
-        if self.is_new {
+        if self.is_new && !self.keeps_others {
             let removed = remove_results(self.folder)?;
             if removed > 0 {
                 let message = format!("the results of an earlier run were removed ({removed} files)");
