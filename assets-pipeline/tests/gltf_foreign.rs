@@ -423,7 +423,7 @@ fn the_published_schema_names_the_properties() {
     let part = json!({"name": "p", "material": "other", "authored": true, "points": 1});
     let provenance = json!({"of": "geometry", "kind": "measured", "source": "s", "licence": "MIT"});
     let whole = json!({
-        "version": 1, "name": "n", "mesh": 0, "pointCount": 3, "parts": [part], "occlusion": 2,
+        "version": 1, "name": "n", "mesh": 0, "authoredNormals": true, "pointCount": 3, "parts": [part], "occlusion": 2,
         "shapeOcclusion": [{"shape": "jawOpen", "points": 3, "changes": 4}],
         "landmarks": {"a": [0.0, 0.0, 0.0]}, "maps": maps, "provenance": [provenance], "rig": {}, "sequence": {},
         "skinLookUp": {"image": 0, "mostMelanin": 0.5, "mostHemoglobin": 0.32},

@@ -187,10 +187,10 @@ fn the_first_hairs_stand_for_all() {
 #[test]
 fn hairs_come_one_by_one_and_all_are_drawn_near_by() {
     assert_eq!(drawn_hairs(1000, 0.0), 1000);
-    assert_eq!(drawn_hairs(1000, 0.0004), 1000);
+    assert_eq!(drawn_hairs(1000, 0.0003), 1000);
     let mut last = 1000;
     for i in 0..20_000 {
-        let now = drawn_hairs(1000, 0.0005 + 0.0000005 * i as f32);
+        let now = drawn_hairs(1000, 0.0004 + 0.0000005 * i as f32);
         assert!(now >= 1 && now <= last && last - now <= 2, "{last} {now}");
         last = now;
     }
