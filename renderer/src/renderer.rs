@@ -323,7 +323,7 @@ impl Renderer {
         scene: &Scene<'_>,
         settings: &Settings,
     ) -> Result<RasterMethod, RenderError> {
-        if self.gpu.info.device_type == wgpu::DeviceType::Cpu || !self.gpu.has_timestamps {
+        if self.gpu.is_software() || !self.gpu.has_timestamps {
             return Ok(RasterMethod::Hardware);
         }
         let mut cost_ms = [f64::INFINITY; 2];

@@ -118,6 +118,11 @@ impl Studio {
         }
     }
 
+    /// Whether the device is a processor and not a graphics card.
+    pub fn is_software(&self) -> bool {
+        self.renderer.gpu().is_software()
+    }
+
     /// Whether passes can be timed.
     pub fn has_timestamps(&self) -> bool {
         self.renderer.gpu().has_timestamps

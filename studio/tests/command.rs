@@ -1,11 +1,13 @@
 //! The command as a person uses it: its results, and its messages on wrong input.
 
-use std::io::Write;
+mod support;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
 use rubor_assets::image_io::{SampleKind, save_image};
 use rubor_rig::map::Map;
+use support::can_draw;
 
 fn rubor(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rubor")).args(arguments).output().expect("the command starts")
@@ -39,16 +41,6 @@ impl Folder {
 
 fn text(path: &Path) -> String {
     path.to_string_lossy().into_owned()
-}
-
-/// False, with a loud message, if there is no adapter.
-fn can_draw() -> bool {
-    let found = rubor(&["adapters"]).status.success();
-    assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
-    if !found {
-        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
-    }
-    found
 }
 
 /// The command must refuse: exit code 2, every phrase in one message, and nothing in the output folder.

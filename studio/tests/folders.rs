@@ -2,13 +2,15 @@
 
 #![cfg(unix)]
 
+mod support;
+
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use rubor_rig::random::SplitMix64;
+use support::can_draw;
 
 fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_rubor"));
@@ -22,16 +24,6 @@ fn rubor(arguments: &[&str]) -> Output {
 
 fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-/// False, with a loud message, if there is no adapter.
-fn can_draw() -> bool {
-    let found = rubor(&["adapters"]).status.success();
-    assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
-    if !found {
-        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
-    }
-    found
 }
 
 /// Kills of each command: those that the environment asks for, or a few.

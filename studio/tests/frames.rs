@@ -1,15 +1,16 @@
 //! Frames do not depend on which others are drawn, in which order, and by how many processes.
 
+mod support;
+
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::Path;
 
 use rubor::inputs::{self, LoadedHead};
 use rubor::job::FrameList;
-use rubor::studio::adapters;
 use rubor::{Destination, Job, Plan, Stop, Studio, farm, run};
 use rubor_renderer::settings::AntialiasMethod;
 use rubor_rig::timeline::Sequence;
+use support::can_draw;
 
 /// A head that turns, talks and flushes under light that turns with every frame, seen by a camera that moves.
 const MOVING: &str = r#"{ "fps": 12, "duration": 0.5,
@@ -20,15 +21,6 @@ const MOVING: &str = r#"{ "fps": 12, "duration": 0.5,
               "translation": [{ "t": 0, "v": [0, 0, 0] }, { "t": 0.3, "v": [0.02, 0, 0] }] },
     "camera": { "framing": "close", "orbitDegrees": [{ "t": 0, "v": 0 }, { "t": 0.5, "v": 9 }] },
     "environment": { "name": "studio", "rotationDegrees": [{ "t": 0, "v": 0.4 }, { "t": 0.5, "v": 3.1 }] } }"#;
-
-fn can_draw() -> bool {
-    let found = !adapters().is_empty();
-    assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
-    if !found {
-        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
-    }
-    found
-}
 
 fn moving_job(heads: &[LoadedHead], antialias: AntialiasMethod) -> Job {
     let sequence = Sequence::from_json("moving.json", MOVING).expect("a sequence");

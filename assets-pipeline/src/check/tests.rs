@@ -49,9 +49,13 @@ const RIG: &str = r#"{"expressions": {
 }}"#;
 
 fn visible(head: &Head, rig: &str, sequence: Option<&str>) -> Vec<String> {
+    visible_for(1, head, rig, sequence)
+}
+
+fn visible_for(seconds: u32, head: &Head, rig: &str, sequence: Option<&str>) -> Vec<String> {
     let rig = Rig::from_json("rig.json", rig).unwrap();
     let sequence = sequence.map(|s| {
-        let text = format!(r#"{{"fps": 4, "duration": 1, "expressions": {s}}}"#);
+        let text = format!(r#"{{"fps": 4, "duration": {seconds}, "expressions": {s}}}"#);
         Sequence::from_json("s.json", &text).unwrap()
     });
     let evaluator = sequence.map(|s| Evaluator::new(head, &rig, &s).unwrap().0);
@@ -70,6 +74,8 @@ fn says(findings: &[String], words: &[&str]) {
 fn a_good_head_has_nothing_to_hide() {
     assert_eq!(visible(&good(), RIG, None), [""; 0]);
     assert_eq!(visible(&good(), RIG, Some(r#"{"joy": 1}"#)), [""; 0]);
+    // An hour and a half.
+    says(&visible_for(5400, &good(), RIG, Some(r#"{"joy": 1}"#)), &["sequence: of 2160", "was looked at"]);
     assert!(head::check(&good()).iter().all(|f| f.severity == Severity::Note));
 }
 

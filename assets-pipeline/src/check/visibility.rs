@@ -76,6 +76,12 @@ pub fn check(scene: &Scene<'_>) -> Vec<Finding> {
             findings.push(Finding::note(kind, message).fix("key what stands in brackets"));
         }
     }
+    if let Some(evaluator) = scene.evaluator.filter(|e| step(e) > 1) {
+        let (count, step) = (evaluator.frame_count(), step(evaluator));
+        let message =
+            format!("of {count} frames one in {step} was looked at: what shows for less may be missed above");
+        findings.push(Finding::note("sequence", message));
+    }
     findings
 }
 
@@ -277,7 +283,10 @@ const MOST_FRAMES: u32 = 4320;
 
 /// Times of the frames that are looked at, seconds.
 fn looked_at(evaluator: &Evaluator) -> impl Iterator<Item = f64> + '_ {
-    let count = evaluator.frame_count();
-    let step = count.div_ceil(MOST_FRAMES).max(1);
-    (0..count).step_by(step as usize).map(|frame| evaluator.frame_time_s(frame))
+    (0..evaluator.frame_count()).step_by(step(evaluator) as usize).map(|frame| evaluator.frame_time_s(frame))
+}
+
+/// From a frame that is looked at to the next.
+fn step(evaluator: &Evaluator) -> u32 {
+    evaluator.frame_count().div_ceil(MOST_FRAMES).max(1)
 }

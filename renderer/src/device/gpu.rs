@@ -87,6 +87,11 @@ const WELCOME_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
 
 impl Gpu {
+    /// Whether the device is a processor and not a graphics card.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Opens the best adapter, or the one whose index or part of whose name (any letter case) is `wanted`.
     ///
     /// # Errors

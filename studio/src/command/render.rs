@@ -6,7 +6,7 @@ use rubor::inputs::{self, LoadedHead};
 use rubor::job::FrameList;
 use rubor::notes::Note;
 use rubor::review::inset;
-use rubor::{Destination, Job, Outcome, Plan, Report, Studio, Watch, run, studio};
+use rubor::{Destination, Job, Outcome, Plan, Report, Studio, Watch, run};
 use rubor_renderer::settings::Preset;
 
 use super::console::{self, Progress};
@@ -155,7 +155,8 @@ impl Shared {
         let (sequence, _) = inputs::sequence(None)?;
         let mut job = Job::new(&heads, inputs::rig(None, heads[0].rig.clone())?, sequence)?;
         job.settings = self.changes.settings.settings(job.sequence.size)?;
-        if self.changes.settings.preset().is_none() && is_software(self.results.adapter.as_deref()) {
+        let studio = Studio::open(self.results.adapter.as_deref())?;
+        if self.changes.settings.preset().is_none() && studio.is_software() {
             job.settings.quality = Preset::Draft.quality();
             let [width, height] = std::mem::replace(&mut job.settings.output.size, PREVIEW);
             let message = format!(
@@ -167,20 +168,8 @@ impl Shared {
         }
         self.changes.apply(&mut job)?;
         job.seal(&heads)?;
-        self.results.make(&job, &heads, self.resume, None)
+        self.results.draw(&Plan::new(&job, &heads)?, studio, self.resume, None)
     }
-}
-
-/// Whether an adapter is a processor and not a graphics card.
-fn is_software(adapter: Option<&str>) -> bool {
-    let found = studio::adapters();
-    let chosen = match adapter {
-        None => found.first(),
-        Some(wanted) => found.iter().find(|a| {
-            a.index.to_string() == wanted || a.name.to_lowercase().contains(&wanted.to_lowercase())
-        }),
-    };
-    chosen.is_some_and(|a| a.kind == "Cpu")
 }
 
 impl Results {
@@ -193,7 +182,10 @@ impl Results {
         chunks: Option<PathBuf>,
     ) -> Outcome {
         let plan = Plan::new(job, heads)?;
-        let mut studio = Studio::open(self.adapter.as_deref())?;
+        self.draw(&plan, Studio::open(self.adapter.as_deref())?, resume, chunks)
+    }
+
+    fn draw(&self, plan: &Plan<'_>, mut studio: Studio, resume: bool, chunks: Option<PathBuf>) -> Outcome {
         let to = Destination {
             folder: self.output.clone(),
             resume,
@@ -203,7 +195,7 @@ impl Results {
             stop: signals::watched()?,
         };
         let mut progress = Progress::default();
-        let report = run::run(&plan, &mut studio, &to, &mut progress);
+        let report = run::run(plan, &mut studio, &to, &mut progress);
         progress.end();
         let report = report?;
         if self.json {
