@@ -33,6 +33,8 @@ mod tests;
 
 #[cfg(not(target_arch = "wasm32"))]
 pub use device::native;
+#[cfg(feature = "faults")]
+pub use device::wgsl::faults;
 pub use device::{AdapterDescription, FrameTimes, Gpu, PassTimer, PendingTimes};
 pub use error::RenderError;
 pub use passes::antialias;

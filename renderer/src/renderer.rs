@@ -486,7 +486,6 @@ impl Renderer {
             + self.passes.shadow.bytes()
             + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
-            + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.past.history.as_ref().map_or(0, History::memory_bytes)
             + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()
     }

@@ -18,6 +18,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
+use crate::auto::Auto;
 use crate::environment;
 use crate::error::{Failure, Outcome};
 use crate::inputs::{self, LoadedHead};
@@ -51,6 +52,9 @@ pub struct Job {
     /// How frames are made. A missing size is that of the sequence; other missing settings have their defaults.
     #[serde(default)]
     pub settings: Settings,
+    /// Settings that are chosen frame by frame, in place of those above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub auto: Option<Auto>,
     /// A map of the first head's current state in a corner of each frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inset: Option<inset::Map>,
@@ -133,6 +137,7 @@ impl Job {
             lights: None,
             environment: None,
             settings,
+            auto: None,
             inset: None,
             frames: None,
         };

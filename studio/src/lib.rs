@@ -40,6 +40,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::exit)]
 
+pub mod auto;
 mod claim;
 pub mod environment;
 pub mod error;

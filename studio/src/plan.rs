@@ -9,12 +9,14 @@
 //! frame, depending on the speeds of both, and the speed of the previous frame comes from positions one frame earlier.
 //! So where a frame does not follow the last one drawn, the two before it are drawn first, after a cut.
 
+use rubor_renderer::settings::Settings;
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::head::Head;
 
+use crate::auto::{Auto, Chosen, Features, Outline};
 use crate::error::{Failure, Outcome};
 use crate::inputs::LoadedHead;
-use crate::job::{Job, MOST_FRAMES};
+use crate::job::{FrameList, Job, MOST_FRAMES};
 use crate::notes::Note;
 use crate::studio::{Frame, Studio};
 
@@ -30,6 +32,9 @@ pub struct Plan<'a> {
     evaluators: Vec<Evaluator>,
     frames: Vec<u32>,
     spacing_m: f32,
+    /// What was chosen for the frames up to the last one that is drawn, and settings with it; empty without `auto`.
+    chosen: Vec<Chosen>,
+    settings: Vec<Settings>,
     notes: Vec<Note>,
 }
 
@@ -73,7 +78,71 @@ impl<'a> Plan<'a> {
             notes.push(Note::new("sequence", hint));
         }
         let spacing_m = spacing_m(heads.iter().map(|h| &h.head));
-        Ok(Self { job, heads, evaluators, frames, spacing_m, notes })
+        let mut plan = Self {
+            job,
+            heads,
+            evaluators,
+            frames,
+            spacing_m,
+            chosen: Vec::new(),
+            settings: Vec::new(),
+            notes,
+        };
+        if let Some(auto) = &job.auto {
+            plan.choose(auto)?;
+        }
+        Ok(plan)
+    }
+
+    /// Chooses settings for every frame, from the first of the sequence on.
+    fn choose(&mut self, auto: &Auto) -> Outcome {
+        let outlines: Vec<Outline> = self.heads.iter().map(|h| Outline::of(&h.head)).collect();
+        let size = self.job.settings.output.size;
+        let end = self.frames.last().map_or(0, |last| last + 1);
+        let features = (0..end).map(|frame| {
+            let shots = self.shots(frame);
+            // Camera and lamps are those of the first.
+            let seen = |(outline, shot): (&Outline, &Shot)| {
+                let Some(first) = shots.first() else { return Features::default() };
+                outline.features(&Shot { face: shot.face.clone(), ..first.clone() }, size)
+            };
+            outlines.iter().zip(&shots).map(seen).collect()
+        });
+        self.chosen = auto.run(features, size);
+        self.settings =
+            self.chosen.iter().map(|c| auto.settings(&self.job.settings, c)).collect::<Outcome<_>>()?;
+        let device = &auto.calibration.adapter.name;
+        let about = format!("settings by need ({}), by the estimates for {device}", auto.bound);
+        self.notes.push(Note::new("auto", about));
+        let broken =
+            self.frames.iter().filter(|f| self.chosen.get(**f as usize).is_some_and(|c| !c.is_kept)).count();
+        if broken > 0 {
+            let message = format!(
+                "{broken} of {} frames cannot keep {}; they come as near as they can",
+                self.frames.len(),
+                auto.bound
+            );
+            self.notes.push(Note::new("auto", message));
+        }
+        Ok(())
+    }
+
+    /// What `auto` chose for the frames of the job: runs of frames from 1, and words.
+    pub fn chosen(&self) -> Vec<(String, String)> {
+        let Some(auto) = &self.job.auto else { return Vec::new() };
+        let of = |frame: &u32| self.chosen.get(*frame as usize);
+        self.frames
+            .chunk_by(|a, b| of(a).map(|c| &c.choices) == of(b).map(|c| &c.choices))
+            .filter_map(|run| {
+                let list = FrameList::new(run.iter().map(|f| f + 1))?;
+                Some((list.to_string(), auto.words(of(run.first()?)?)))
+            })
+            .collect()
+    }
+
+    /// Settings of a frame.
+    pub fn settings(&self, frame: u32) -> &Settings {
+        self.settings.get(frame as usize).unwrap_or(&self.job.settings)
     }
 
     /// The job.
@@ -127,8 +196,7 @@ impl<'a> Plan<'a> {
         frames: &[u32],
         mut take: impl FnMut(Shown) -> Outcome,
     ) -> Outcome {
-        let settings = &self.job.settings;
-        let before = if settings.quality.antialias.is_temporal() { REMEMBERED_FRAMES } else { 0 };
+        let before = if self.job.settings.quality.antialias.is_temporal() { REMEMBERED_FRAMES } else { 0 };
         let mut last = None;
         let mut waiting = None;
         for &frame in frames {
@@ -136,12 +204,12 @@ impl<'a> Plan<'a> {
                 let start = frame.saturating_sub(before);
                 studio.cut(start);
                 for earlier in start..frame {
-                    studio.draw(&self.shots(earlier), self.spacing_m, settings)?;
+                    studio.draw(&self.shots(earlier), self.spacing_m, self.settings(earlier))?;
                 }
             }
             last = Some(frame);
             let shots = self.shots(frame);
-            let drawn = studio.draw(&shots, self.spacing_m, settings)?;
+            let drawn = studio.draw(&shots, self.spacing_m, self.settings(frame))?;
             if let Some((frame, shots, drawn)) = waiting.replace((frame, shots, drawn)) {
                 take(Shown { frame, shots, drawn: studio.finish(drawn)? })?;
             }

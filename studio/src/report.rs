@@ -10,6 +10,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::measure::chart::Measure;
+
 /// A report. In JSON, `of` names the kind of work.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "of", rename_all = "kebab-case")]
@@ -21,6 +23,10 @@ pub enum Report {
     Bench(BenchReport),
     /// Cost and error of methods.
     Chart(ChartReport),
+    /// Steadiness of methods while something moves.
+    Stability(StabilityReport),
+    /// Choices of `auto` beside every fixed setting.
+    Auto(AutoReport),
     /// A page of pictures.
     Gallery(GalleryReport),
 }
@@ -52,6 +58,9 @@ pub struct JobReport {
     pub adapter: Adapter,
     /// How frames were made.
     pub settings: Settings,
+    /// What was chosen for frames, in words, where settings are chosen by need.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub auto: Vec<AutoRun>,
     /// Frames of the job.
     pub frames: usize,
     /// Those that this run drew; the others existed already.
@@ -72,6 +81,16 @@ pub struct JobReport {
     pub files: Vec<PathBuf>,
     /// Notes, one line per kind.
     pub notes: Vec<String>,
+}
+
+/// Frames with the same choices.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct AutoRun {
+    /// Numbers of frames from 1.
+    pub frames: String,
+    /// Choices, and the estimated error and time of the first of these frames.
+    pub chosen: String,
 }
 
 /// A texture of a head.
@@ -154,37 +173,220 @@ pub struct PassCost {
     pub p90: f64,
 }
 
-/// Cost and error of methods on one frame.
+impl PassCost {
+    /// From the milliseconds of all frames.
+    pub(crate) fn of(name: &str, runs: usize, mut ms: Vec<f64>) -> Self {
+        ms.sort_by(f64::total_cmp);
+        let at =
+            |share: f64| ms.get(((ms.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(0.0);
+        Self { name: name.to_owned(), runs, median: at(0.5), p10: at(0.1), p90: at(0.9) }
+    }
+}
+
+/// Cost and error of choices in scenes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct ChartReport {
     /// Device.
     pub adapter: Adapter,
-    /// Relative standard error of the diffuse light of `reference-surface`; the largest where it was drawn several times.
-    pub surface_noise: Option<f64>,
-    /// One for each method.
-    pub methods: Vec<ChartRow>,
+    /// The base: each group changes one setting of it.
+    pub settings: Settings,
+    /// Rounds, warm-up frames and timed frames of a choice in a scene and a round; none if nothing was timed.
+    pub timing: Option<[u32; 3]>,
+    /// What was drawn.
+    pub scenes: Vec<ChartScene>,
+    /// What was compared.
+    pub groups: Vec<ChartGroup>,
 }
 
-/// A method in numbers.
+/// A scene of a chart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
-pub struct ChartRow {
-    /// Its scattering method, and the other settings that differ between rows.
+pub struct ChartScene {
+    /// Name.
     pub name: String,
-    /// How the frame was made.
+    /// The failure that it provokes.
+    pub provokes: String,
+    /// Relative standard error of the diffuse light of `reference-surface`.
+    pub noise: Option<f64>,
+}
+
+/// Choices that differ in one setting.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct ChartGroup {
+    /// The flag of the setting.
+    pub flag: String,
+    /// What the error is.
+    pub measure: Measure,
+    /// The settings that count as right.
+    pub truth: String,
+    /// Right pictures, one for each scene, relative to the report.
+    pub truth_pictures: Vec<String>,
+    /// The choices.
+    pub choices: Vec<ChartChoice>,
+}
+
+/// A choice in numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct ChartChoice {
+    /// The value of the setting, and what else differs from the base.
+    pub name: String,
+    /// How frames were made.
     pub settings: Settings,
-    /// Relative RMSE of diffuse radiance before albedo, on skin, to `reference-screen`.
-    pub relative_rmse_to_screen: f64,
-    /// The same to `reference-surface`.
-    pub relative_rmse_to_surface: f64,
-    /// FLIP of the displayed picture to that of `reference-surface`, over skin.
+    /// Over all scenes.
+    pub overall: Option<ChartOverall>,
+    /// One for each scene.
+    pub points: Vec<ChartPoint>,
+}
+
+/// A choice over all scenes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct ChartOverall {
+    /// Error: of light the root of the mean square over scenes, of pictures the mean.
+    pub error: f64,
+    /// Error in the worst scene.
+    pub worst: f64,
+    /// Mean over scenes of the median time of a frame, milliseconds; none if it was not timed.
+    pub frame_ms: Option<f64>,
+    /// Whether no other choice of the group is at most as slow and at most as wrong.
+    pub is_on_front: bool,
+}
+
+/// A choice in a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct ChartPoint {
+    /// How far it is from the truth of its group.
+    pub error: ChartError,
+    /// Time of a whole frame; none if it was not timed.
+    pub frame: Option<PassCost>,
+    /// Whether no other choice of the group is at most as slow and at most as wrong in this scene.
+    pub is_on_front: bool,
+    /// Its picture, relative to the report.
+    pub picture: Option<String>,
+    /// Its map of visible differences, relative to the report.
+    pub difference: Option<String>,
+}
+
+/// Errors of a picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct ChartError {
+    /// FLIP of the displayed picture: over skin where the measure is light, else over the head and the pixels around it.
     pub flip_mean: f64,
     /// Its 99th percentile.
     #[serde(rename = "flip99")]
     pub flip_99: f64,
-    /// GPU milliseconds of scattering; none without timestamps.
-    pub scatter_ms: Option<f64>,
+    /// Relative RMSE of diffuse radiance before albedo, on skin, to `reference-surface`; only where the measure is light.
+    pub relative_rmse_to_surface: Option<f64>,
+    /// The same to `reference-screen`.
+    pub relative_rmse_to_screen: Option<f64>,
+}
+
+impl ChartError {
+    /// The number by which choices are compared.
+    pub fn of(&self, measure: Measure) -> f64 {
+        match measure {
+            Measure::Light => self.relative_rmse_to_surface.unwrap_or(f64::NAN),
+            Measure::Picture => self.flip_mean,
+        }
+    }
+}
+
+/// How well `auto` chooses in scenes that its estimates never saw.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct AutoReport {
+    /// Device.
+    pub adapter: Adapter,
+    /// Settings that it does not choose.
+    pub settings: Settings,
+    /// Names of the scenes.
+    pub scenes: Vec<String>,
+    /// Combinations of choices that were drawn and timed in each scene.
+    pub combinations: usize,
+    /// One for each bound.
+    pub rows: Vec<AutoRow>,
+}
+
+/// `auto` under a bound.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct AutoRow {
+    /// Mean FLIP that a frame may have.
+    pub bound: f64,
+    /// Scenes in which some combination keeps it.
+    pub possible: usize,
+    /// Those in which the chosen one keeps it.
+    pub kept: usize,
+    /// Mean time of the chosen ones, milliseconds.
+    pub mean_ms: f64,
+    /// That time over that of the cheapest combination of each scene that keeps the bound.
+    pub over_cheapest: f64,
+    /// That time over that of the cheapest one combination for all scenes that keeps the bound as often; none if there is none.
+    pub over_fixed: Option<f64>,
+    /// Mean error of the chosen ones.
+    pub mean_flip: f64,
+}
+
+/// Steadiness of choices while one quantity moves.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct StabilityReport {
+    /// Device.
+    pub adapter: Adapter,
+    /// The base: each group changes one setting of it.
+    pub settings: Settings,
+    /// What moved.
+    pub sweeps: Vec<SweepReport>,
+    /// One for each choice and sweep.
+    pub rows: Vec<StabilityRow>,
+}
+
+/// A sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct SweepReport {
+    /// Name.
+    pub name: String,
+    /// What moves, and its unit.
+    pub moves: String,
+    /// Whether each step multiplies the quantity.
+    pub is_geometric: bool,
+    /// The quantity at each step.
+    pub values: Vec<f64>,
+}
+
+/// A choice in a sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct StabilityRow {
+    /// The flag of its group.
+    pub group: String,
+    /// Its name.
+    pub choice: String,
+    /// Name of the sweep.
+    pub sweep: String,
+    /// Largest temporal residual: root of the mean square over pixels of the change from a step to the next, less that of the
+    /// truth; displayed light, 0 to 1.
+    pub residual: f64,
+    /// Largest residual of a step over the mean of its neighbours'; 1 where none stands out.
+    pub jump: f64,
+    /// Largest light two pixels or more outside of the head that the truth does not have, 0 to 1.
+    pub halo: f64,
+    /// Least and most diffuse light of skin, over that of `reference-screen`.
+    pub energy: [f64; 2],
+    /// Values of diffuse light that are no finite numbers.
+    pub broken_values: usize,
+    /// The slowest step over the median; none if nothing was timed.
+    pub cost_spike: Option<f64>,
+    /// Residual of each step to the next.
+    pub residuals: Vec<f64>,
+    /// Diffuse light of each step over that of `reference-screen`.
+    pub energies: Vec<f64>,
 }
 
 /// A page of pictures.

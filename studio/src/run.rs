@@ -20,7 +20,7 @@ use crate::job::Job;
 use crate::notes::{Note, summed};
 use crate::output;
 use crate::plan::{Plan, Shown};
-use crate::report::{JobReport, PassTimes, Report, median};
+use crate::report::{AutoRun, JobReport, PassTimes, Report, median};
 use crate::review::inset::Inset;
 use crate::review::{contact_sheet, video};
 use crate::stop::Stop;
@@ -191,6 +191,7 @@ pub fn run(
     let report = JobReport {
         adapter: studio.adapter(),
         settings: job.settings.clone(),
+        auto: plan.chosen().into_iter().map(|(frames, chosen)| AutoRun { frames, chosen }).collect(),
         frames: plan.frames().len(),
         frames_drawn: to_draw.len(),
         seconds_to_first_frame: first_frame_s,

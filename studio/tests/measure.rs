@@ -190,8 +190,13 @@ fn comparisons_of_images_and_folders() {
     folder.refused(&["compare", &folder.path("broken.png"), &a], &["broken.png"]);
 }
 
+/// An ear with a lamp behind it.
+const EAR: &str = r#"{ "fps": 1, "duration": 1,
+    "camera": { "target": [0.08, -0.01, -0.08], "position": [0.15, 0, 0.15] },
+    "lights": [{ "kind": "spot", "intensity": 14, "position": [0.28, 0.2, -0.9] }] }"#;
+
 #[test]
-fn a_chart_has_a_row_a_method_and_its_pictures() {
+fn a_chart_has_a_row_a_choice_its_pictures_and_its_page() {
     let folder = Folder::new();
     folder.refused(&["chart", "--scatter", "separable:8"], &["separable:8", "odd"]);
     folder.refused(&["chart", "--transmit", "shadow"], &["shadow-depth"]);
@@ -200,18 +205,41 @@ fn a_chart_has_a_row_a_method_and_its_pictures() {
         return;
     }
     let out = folder.path("out");
-    let small = ["chart", "--size", "48x48", "--frames", "1", "--json"];
-    let chart =
-        folder.json(&[&small[..], &["--batches", "2", "--scatter", "none,separable:5", "-o", &out]].concat());
-    let names: Vec<_> =
-        chart["methods"].as_array().expect("rows").iter().map(|r| r["name"].clone()).collect();
-    assert_eq!(names, ["reference-screen", "none", "separable:5"]);
-    assert!(chart["surfaceNoise"].as_f64().is_some_and(|n| n > 0.0 && n < 0.5), "{chart}");
-    let error = |i: usize| chart["methods"][i]["relativeRmseToScreen"].as_f64().unwrap_or(f64::NAN);
-    assert!(error(0) == 0.0 && error(1) > 0.0 && error(2) > 0.0, "{chart}");
-    for file in ["reference-surface.png", "reference-surface.exr", "separable-5.exr", "none-difference.png"] {
+    let scene = folder.path("ear.json");
+    std::fs::write(&scene, EAR).expect("a sequence");
+    let small =
+        ["chart", "--sequence", &scene, "--size", "48x48", "--frames", "1", "--rounds", "1", "--json"];
+    let lists = ["--batches", "2", "--scatter", "none,separable:5", "--wrinkles", "none,partial-derivative"];
+    let chart = folder.json(&[&small[..], &lists, &["-o", &out]].concat());
+    let [scatter, wrinkles] = [0, 1].map(|g| &chart["groups"][g]);
+    let names = |group: &Value| -> Vec<Value> {
+        group["choices"].as_array().expect("choices").iter().map(|c| c["name"].clone()).collect()
+    };
+    assert_eq!(names(scatter), ["reference-screen", "none", "separable:5"]);
+    assert_eq!(names(wrinkles), ["none", "partial-derivative"]);
+    assert!(chart["scenes"][0]["noise"].as_f64().is_some_and(|n| n > 0.0 && n < 0.5), "{chart}");
+    let error =
+        |c: usize, name: &str| scatter["choices"][c]["points"][0]["error"][name].as_f64().unwrap_or(f64::NAN);
+    let to_screen = [0, 1, 2].map(|c| error(c, "relativeRmseToScreen"));
+    assert!(to_screen[0] == 0.0 && to_screen[1] > to_screen[2] && to_screen[2] > 0.0, "{chart}");
+    assert!(error(1, "relativeRmseToSurface") > error(2, "relativeRmseToSurface"), "{chart}");
+    assert_eq!(wrinkles["choices"][1]["overall"]["error"], 0.0, "what counts as right has no error");
+    for file in [
+        "ear/truth-scatter.png",
+        "ear/truth-scatter.exr",
+        "ear/scatter_separable-5.png",
+        "ear/scatter_none-difference.png",
+        "chart.json",
+        "chart.csv",
+        "chart.svg",
+        "index.html",
+    ] {
         assert!(Path::new(&out).join(file).is_file(), "{file}");
     }
+    let page = std::fs::read_to_string(Path::new(&out).join("index.html")).expect("a page");
+    assert!(page.contains("ear/scatter_separable-5.png") && !page.contains("http://localhost"));
+    let lines = std::fs::read_to_string(Path::new(&out).join("chart.csv")).expect("a table");
+    assert_eq!(lines.lines().count(), 1 + 5, "{lines}");
     folder.refused(&[&small[..], &["--batches", "0"]].concat(), &["reference-surface:0", "1 to 4096"]);
     folder.refused(&[&small[..], &["--exposure", "nan"]].concat(), &["exposure"]);
     folder.refused(&[&small[..], &["--adapter", "abacus"]].concat(), &["abacus"]);

@@ -3,13 +3,11 @@
 use std::io::Write;
 use std::path::Path;
 
-use rubor::measure::chart::{self, Options};
+use rubor::measure::chart::{self, Effort, Options, Suite};
 use rubor::{Outcome, Studio, studio};
 use rubor_assets::import;
-use rubor_renderer::settings::{AntialiasMethod, Output, Quality, ScatterMethod, Settings};
-use rubor_rig::evaluate::Evaluator;
+use rubor_renderer::settings::{AntialiasMethod, Output, Quality, Settings};
 use rubor_rig::expression::Rig;
-use rubor_rig::timeline::Sequence;
 
 #[test]
 fn pre_integrated_light_on_the_head_is_near_the_reference() -> Outcome {
@@ -23,23 +21,20 @@ fn pre_integrated_light_on_the_head_is_near_the_reference() -> Outcome {
     studio.set_heads([&head])?;
     // The shadow of the nose on the cheek.
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/nose.json");
-    let (evaluator, _) = Evaluator::new(&head, &Rig::default_rig()?, &Sequence::load(&scene)?)?;
-    let of = |scatter| Settings {
+    let (scene, _) = chart::scene_of(&scene, &head, &Rig::default_rig()?)?;
+    let base = Settings {
         output: Output { size: [64, 64], ..Output::default() },
-        quality: Quality {
-            scatter,
-            antialias: AntialiasMethod::None,
-            shadow_size: 1024,
-            ..Quality::default()
-        },
+        quality: Quality { antialias: AntialiasMethod::None, shadow_size: 1024, ..Quality::default() },
         ..Settings::default()
     };
-    let methods = [ScatterMethod::PreIntegrated(1), ScatterMethod::PreIntegrated(3)];
-    let options = Options { batches: 8, frames: 0, folder: None };
-    let report = chart::run(&mut studio, &evaluator.at(0.0), &methods.map(of), &options)?;
+    let listed = [("scatter".to_owned(), vec!["pre-integrated:1".into(), "pre-integrated:3".into()])];
+    let effort = Effort { batches: 8, samples: 1 };
+    let groups = chart::groups(Suite::Quick, &base, &listed, &[], effort)?;
+    let options = Options { timing: None, folder: None, light: false };
+    let report = chart::run(&mut studio, &base, &[scene], &groups, &options, &mut ())?;
     for name in ["pre-integrated:1", "pre-integrated:3"] {
-        let row = report.methods.iter().find(|m| m.name == name);
-        let error = row.map_or(f64::NAN, |m| m.relative_rmse_to_surface);
+        let choice = report.groups[0].choices.iter().find(|c| c.name == name);
+        let error = choice.and_then(|c| c.overall.as_ref()).map_or(f64::NAN, |o| o.error);
         // 0.036, of which the reference's own noise is 0.016; `none` has 0.032 (docs/scatter.md says why).
         assert!(error > 0.0 && error < 0.045, "{name}: {error}");
     }

@@ -92,6 +92,64 @@ pub(crate) struct Linked {
     pub(crate) bindings: Vec<Binding>,
 }
 
+/// The text of a module.
+#[cfg(not(feature = "faults"))]
+fn source(module: &Module) -> &'static str {
+    module.source
+}
+
+/// The text of a module, wrong if a test asked for it.
+#[cfg(feature = "faults")]
+fn source(module: &Module) -> String {
+    faults::changed(module)
+}
+
+/// Wrong shaders on purpose: what measures errors has to notice them. Only with the feature `faults`, which tests use.
+#[cfg(feature = "faults")]
+pub mod faults {
+    use std::sync::{Mutex, PoisonError};
+
+    /// A change of a shader module.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Fault {
+        /// Name of the module, without `package::`.
+        pub module: &'static str,
+        /// Text that it has once.
+        pub right: &'static str,
+        /// Text in its place.
+        pub wrong: &'static str,
+    }
+
+    /// The fault of this process, and how often it was put in.
+    static FAULT: Mutex<(Option<Fault>, u32)> = Mutex::new((None, 0));
+
+    /// Links all shaders with a fault from now on, or with none; returns how many modules had the last one.
+    pub fn set(fault: Option<Fault>) -> u32 {
+        let mut set = FAULT.lock().unwrap_or_else(PoisonError::into_inner);
+        let count = set.1;
+        *set = (fault, 0);
+        count
+    }
+
+    pub(super) fn changed(module: &super::Module) -> String {
+        let mut set = FAULT.lock().unwrap_or_else(PoisonError::into_inner);
+        match set.0 {
+            Some(fault) if module.path.strip_prefix("package::") == Some(fault.module) => {
+                assert_eq!(
+                    module.source.matches(fault.right).count(),
+                    1,
+                    "{} has {:?} once",
+                    fault.module,
+                    fault.right
+                );
+                set.1 += 1;
+                module.source.replacen(fault.right, fault.wrong, 1)
+            }
+            _ => module.source.to_owned(),
+        }
+    }
+}
+
 impl Program {
     /// A program whose entry points are in `root`.
     pub(crate) fn new(root: Module) -> Self {
@@ -127,7 +185,7 @@ impl Program {
         let mut resolver = VirtualResolver::new();
         let path = |text: &str| text.parse().unwrap_or_else(|e| panic!("module path {text}: {e}"));
         for module in SHARED.iter().chain(&self.modules) {
-            resolver.add_module(path(module.path), module.source.into());
+            resolver.add_module(path(module.path), source(module).into());
         }
         let constants: String =
             self.constants.iter().map(|(name, value)| declaration(name, *value)).collect();

@@ -1,32 +1,67 @@
-//! `rubor chart`: cost and error of scattering methods on one frame of a sequence.
+//! `rubor chart`: cost and error of every choice of a frame, in a suite of scenes.
 
 use std::path::PathBuf;
 
-use rubor::measure::chart::{self, Options};
-use rubor::{Outcome, Report, Studio, inputs};
-use rubor_renderer::settings::ScatterMethod;
-use rubor_rig::evaluate::Evaluator;
+use rubor::auto::{self, Auto, Bound, Calibration, experiment};
+use rubor::measure::chart::{self, Effort, Measure, Options, Suite, Timing, page, plot::number};
+use rubor::measure::stability;
+use rubor::report::{ChartError, ChartGroup, ChartReport, StabilityReport};
+use rubor::{Outcome, Report, Studio, Watch, inputs, output};
+use rubor_renderer::settings::{ScatterMethod, Settings};
+use rubor_rig::expression::Rig;
+use rubor_rig::head::Head;
 
-use super::settings_flags::{Purpose, SettingsFlags};
+use super::console::Progress;
+use super::settings_flags::{Choices, Purpose, SettingsFlags};
 use super::{console, print_json};
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// Sequence (.json) whose first frame is drawn [default: the demo]
+    /// Scenes and methods: quick has six scenes and the common methods, whole has everything [default: whole; quick on a
+    /// software device]
+    #[arg(long, value_name = "NAME", value_parser = ["quick", "whole"])]
+    suite: Option<String>,
+    /// Head (.glb, .gltf, .vrm, .obj, .usda, .usdz) [default: the built-in head]
     #[arg(long, value_name = "FILE")]
-    sequence: Option<PathBuf>,
-    /// Batches of 65 536 samples of reference-surface, which includes the light through thin parts
-    #[arg(long, default_value_t = 64)]
-    batches: u32,
-    /// Timed frames, of which the median counts; as many warm-up frames are drawn before them
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(..=10_000))]
-    frames: u32,
+    head: Option<PathBuf>,
+    /// Sequences (.json) whose first frames are drawn in place of the suite's scenes; may be given again
+    #[arg(long, value_name = "FILE")]
+    sequence: Vec<PathBuf>,
+    /// Batches of 65 536 samples of reference-surface [default: 64; 8 for quick]
+    #[arg(long, value_name = "N")]
+    batches: Option<u32>,
+    /// Samples on a side of a pixel of the picture that counts as right for antialiasing [default: 8; 4 for quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8))]
+    samples: Option<u32>,
+    /// Timed frames of a choice in a scene and a round; 0 times nothing [default: 20; 2 for quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=10_000))]
+    frames: Option<u32>,
+    /// Rounds in which all choices take turns
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    rounds: u32,
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Folder for pictures of each method, its visible differences from reference-surface, and its diffuse light (EXR)
+    /// Folder for the chart: index.html, chart.svg, chart.csv, chart.json, and pictures of each choice, of the truths and of
+    /// visible differences; with --sequence the diffuse light too (EXR)
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// In place of time and error: what methods do while one quantity moves in small steps (stability.svg, .csv, .json)
+    #[arg(long, conflicts_with = "sequence")]
+    stability: bool,
+    /// Steps of each sweep of --stability [default: 24; 8 for quick]
+    #[arg(long, value_name = "N", requires = "stability", value_parser = clap::value_parser!(u32).range(3..=1000))]
+    steps: Option<u32>,
+    /// In place of a chart: measure this device for --max-error and --budget-ms of `render`, on random shots of the head, and
+    /// keep the estimates
+    #[arg(long, conflicts_with_all = ["sequence", "stability"])]
+    calibrate: bool,
+    /// Random shots of --calibrate [default: 64; 24 for quick]
+    #[arg(long, value_name = "N", requires = "calibrate", value_parser = clap::value_parser!(u32).range(16..=4096))]
+    shots: Option<u32>,
+    /// In place of a chart: how well --max-error chooses in the suite's scenes, beside every fixed setting
+    #[arg(long, conflicts_with_all = ["sequence", "stability", "calibrate"])]
+    auto: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -38,45 +73,257 @@ pub(crate) struct Arguments {
 struct Charting;
 impl Purpose for Charting {
     const LISTS: bool = true;
-    const DEFAULTS: &[(&str, &str)] = &[
-        ("size", "256x256"),
-        ("antialias", "none"),
-        (
-            "scatter",
-            "none,separable:9,separable:17,separable:33,screen-gauss:4,screen-gauss:6,screen-jitter,burley-disk:16,burley-disk:64,pre-integrated:1,pre-integrated:3,texture-space:1024,dipole-cubemap:16",
-        ),
-    ];
+    // Antialiasing would soften what the other groups compare.
+    const DEFAULTS: &[(&str, &str)] = &[("antialias", "none"), ("size", SIZE)];
 }
+const SIZE: &str = "384x384";
+const QUICK_SIZE: [u32; 2] = [128, 128];
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
-    let all = arguments.settings.all()?;
-    ScatterMethod::ReferenceSurface(arguments.batches).validate().map_err(rubor::Failure::input)?;
-    let loaded = inputs::head(None)?;
+    let Choices { mut base, listed, held } = arguments.settings.choices()?;
+    let loaded = inputs::head(arguments.head.as_deref())?;
+    console::notes(&loaded.notes);
     let rig = inputs::rig(None, loaded.rig.clone())?;
-    let (sequence, notes) = inputs::sequence(arguments.sequence.as_deref())?;
-    console::notes(&notes);
-    let (evaluator, _) = Evaluator::new(&loaded.head, &rig, &sequence)?;
     let mut studio = Studio::open(arguments.adapter.as_deref())?;
+    let is_quick = arguments.suite.as_deref().map_or(studio.is_software(), |name| name == "quick");
+    let (suite, [batches, samples, frames]) =
+        if is_quick { (Suite::Quick, [8, 4, 2]) } else { (Suite::Whole, [64, 8, 20]) };
+    if is_quick && !held.iter().chain(listed.iter().map(|(flag, _)| flag)).any(|flag| flag == "size") {
+        base.output.size = QUICK_SIZE;
+    }
+    let effort = Effort {
+        batches: arguments.batches.unwrap_or(batches),
+        samples: arguments.samples.unwrap_or(samples),
+    };
+    ScatterMethod::ReferenceSurface(effort.batches).validate().map_err(rubor::Failure::input)?;
+    if arguments.calibrate {
+        return calibrate(arguments, &mut studio, &loaded.head, &rig, &base, is_quick);
+    }
+    if arguments.auto {
+        return judge(arguments, &mut studio, &loaded.head, &rig, &base, suite);
+    }
+    let groups = chart::groups(suite, &base, &listed, &held, effort)?;
+    let frames = arguments.frames.unwrap_or(frames);
+    if let Some(folder) = &arguments.output {
+        output::folder(folder)?;
+    }
     studio.set_heads([&loaded.head])?;
-    let options =
-        Options { batches: arguments.batches, frames: arguments.frames, folder: arguments.output.clone() };
-    let report = chart::run(&mut studio, &evaluator.at(0.0), &all, &options)?;
+    let mut progress = Progress::default();
+    if arguments.stability {
+        let steps = arguments.steps.unwrap_or(if is_quick { 8 } else { 24 }) as usize;
+        let [width, height] = base.output.size;
+        let sweeps = stability::sweeps(&loaded.head, &rig, steps, width.min(height))?;
+        let options = stability::Options { samples: effort.samples.min(4), frames };
+        let groups: Vec<_> = groups.into_iter().filter(|g| MOVING.contains(&g.flag.as_str())).collect();
+        let report =
+            stability::run(&mut studio, &loaded.head, &base, &sweeps, &groups, options, &mut progress);
+        progress.end();
+        return tell_stability(arguments, report?);
+    }
+    let mut scenes = Vec::new();
+    for path in &arguments.sequence {
+        let (scene, notes) = chart::scene_of(path, &loaded.head, &rig)?;
+        console::notes(&notes);
+        scenes.push(scene);
+    }
+    if scenes.is_empty() {
+        let (found, notes) = chart::scenes(suite, &loaded.head, &rig)?;
+        console::notes(&notes);
+        scenes = found;
+    }
+    let timing = Timing { rounds: arguments.rounds, warm_up: frames.div_ceil(2), frames };
+    let options = Options {
+        timing: Some(timing).filter(|t| t.frames > 0),
+        folder: arguments.output.clone(),
+        light: !arguments.sequence.is_empty(),
+    };
+    let report = chart::run(&mut studio, &base, &scenes, &groups, &options, &mut progress);
+    progress.end();
+    console::notes(&studio.take_notes());
+    let report = report?;
+    let page = arguments.output.as_deref().map(|folder| page::write(folder, &report)).transpose()?;
     if arguments.json {
         return print_json(&Report::Chart(report));
     }
-    say!("noise of reference-surface: {:.4}", report.surface_noise.unwrap_or(0.0));
-    say!("| method | relRMSE to reference-screen | to reference-surface | FLIP mean | 99 % | ms |");
-    say!("| --- | --- | --- | --- | --- | --- |");
-    for r in report.methods {
-        let ms = r.scatter_ms.map_or("-".to_owned(), |ms| format!("{ms:.3}"));
+    print(&report)?;
+    if let Some(page) = page {
+        say!("{}", page.display());
+    }
+    Ok(())
+}
+
+/// Seed of the random shots.
+const SEED: u64 = 1;
+
+fn calibrate(
+    arguments: &Arguments,
+    studio: &mut Studio,
+    head: &Head,
+    rig: &Rig,
+    base: &Settings,
+    is_quick: bool,
+) -> Outcome {
+    let shots = arguments.shots.unwrap_or(if is_quick { 24 } else { 64 }) as usize;
+    let scenes = auto::random_shots(head, rig, shots, SEED)?;
+    let listed = auto::calibrated()?;
+    // Right is the best that a frame in one go can reach.
+    let effort = Effort { batches: 0, samples: arguments.samples.unwrap_or(if is_quick { 4 } else { 8 }) };
+    let groups = chart::groups(Suite::Whole, base, &listed, &[], effort)?;
+    let frames = arguments.frames.unwrap_or(if is_quick { 2 } else { 20 });
+    let timing = Timing { rounds: arguments.rounds, warm_up: frames.div_ceil(2), frames };
+    let options = Options { timing: Some(timing), folder: None, light: false };
+    studio.set_heads([head])?;
+    let mut progress = Progress::default();
+    let report = chart::run(studio, base, &scenes, &groups, &options, &mut progress);
+    progress.end();
+    let report = report?;
+    let outline = auto::Outline::of(head);
+    let features: Vec<_> = scenes.iter().map(|s| outline.features(&s.shot, base.output.size)).collect();
+    let calibration = Calibration::of(&report, &features)
+        .ok_or_else(|| rubor::Failure::job("the shots do not suffice for estimates").hint("more --shots"))?;
+    let kept = calibration.keep()?;
+    if let Some(folder) = &arguments.output {
+        output::folder(folder)?;
+        output::write_json(&folder.join("auto.json"), &calibration)?;
+    }
+    if arguments.json {
+        return print_json(&calibration);
+    }
+    print(&report)?;
+    match kept {
+        Some(file) => say!("kept for {}: {}", calibration.adapter.name, file.display()),
+        None => say!("not kept: this system names no folder for data"),
+    }
+    Ok(())
+}
+
+/// Bounds under which choices are judged.
+const BOUNDS: [f64; 5] = [0.005, 0.01, 0.02, 0.04, 0.08];
+
+fn judge(
+    arguments: &Arguments,
+    studio: &mut Studio,
+    head: &Head,
+    rig: &Rig,
+    base: &Settings,
+    suite: Suite,
+) -> Outcome {
+    let (scenes, notes) = chart::scenes(suite, head, rig)?;
+    console::notes(&notes);
+    let name = studio.adapter().name;
+    let auto = Auto {
+        bound: Bound::Flip(1.0),
+        held: Vec::new(),
+        calibration: Calibration::of_devices([name.as_str()])?,
+    };
+    let timing = experiment::Timing { rounds: 2, frames: arguments.frames.unwrap_or(5).max(1) };
+    studio.set_heads([head])?;
+    let mut progress = Progress::default();
+    let report = experiment::run(studio, head, base, &scenes, &auto, &BOUNDS, timing, &mut progress);
+    progress.end();
+    let report = report?;
+    if let Some(folder) = &arguments.output {
+        output::folder(folder)?;
+        output::write_json(&folder.join("auto-experiment.json"), &Report::Auto(report.clone()))?;
+    }
+    if arguments.json {
+        return print_json(&Report::Auto(report));
+    }
+    let [width, height] = base.output.size;
+    say!(
+        "{}, {width}x{height}, {} scenes, {} combinations",
+        report.adapter.name,
+        report.scenes.len(),
+        report.combinations
+    );
+    say!(
+        "| bound | scenes that can keep it | kept | ms | over the cheapest of each scene | over the best fixed one | FLIP |"
+    );
+    say!("| --- | --- | --- | --- | --- | --- | --- |");
+    for r in &report.rows {
+        let fixed = r.over_fixed.map_or("-".to_owned(), |v| format!("{v:.2}"));
         say!(
-            "| `{}` | {:.4} | {:.4} | {:.4} | {:.4} | {ms} |",
-            r.name,
-            r.relative_rmse_to_screen,
-            r.relative_rmse_to_surface,
-            r.flip_mean,
-            r.flip_99
+            "| {} | {} | {} | {} | {:.2} | {fixed} | {:.4} |",
+            r.bound,
+            r.possible,
+            r.kept,
+            number(r.mean_ms),
+            r.over_cheapest,
+            r.mean_flip
         );
+    }
+    Ok(())
+}
+
+/// Groups whose methods may flicker or fail where something moves.
+const MOVING: [&str; 4] = ["scatter", "transmit", "antialias", "detail"];
+
+fn tell_stability(arguments: &Arguments, report: StabilityReport) -> Outcome {
+    let picture =
+        arguments.output.as_deref().map(|folder| stability::page::write(folder, &report)).transpose()?;
+    if arguments.json {
+        return print_json(&Report::Stability(report));
+    }
+    say!("{}", stability::page::about(&report));
+    say!("| sweep | choice | residual | jump | halo | energy | broken values | cost spike |");
+    say!("| --- | --- | --- | --- | --- | --- | --- | --- |");
+    for r in &report.rows {
+        let spike = r.cost_spike.map_or("-".to_owned(), |v| format!("{v:.2}"));
+        let [least, most] = r.energy;
+        say!(
+            "| {} | `{}` | {:.4} | {:.2} | {:.4} | {least:.3} to {most:.3} | {} | {spike} |",
+            r.sweep,
+            r.choice,
+            r.residual,
+            r.jump,
+            r.halo,
+            r.broken_values
+        );
+    }
+    if let Some(picture) = picture {
+        say!("{}", picture.display());
+    }
+    Ok(())
+}
+
+fn print(report: &ChartReport) -> Outcome {
+    say!("{}", page::about(report));
+    let noise = report.scenes.iter().filter_map(|s| s.noise).reduce(f64::max);
+    if let Some(noise) = noise {
+        say!("noise of reference-surface: at most {noise:.4}");
+    }
+    report.groups.iter().try_for_each(table)
+}
+
+/// A table of a group: over all scenes where there are several.
+fn table(group: &ChartGroup) -> Outcome {
+    say!("");
+    say!("{} ({} to {})", group.flag, page::measured(group), group.truth);
+    let is_light = group.measure == Measure::Light;
+    let columns =
+        if is_light { "relRMSE | to reference-screen | FLIP | FLIP 99 %" } else { "FLIP | FLIP 99 %" };
+    say!("| choice | ms a frame | {columns} | worst scene | front |");
+    say!("| --- | {} |", vec!["---"; if is_light { 7 } else { 5 }].join(" | "));
+    for choice in &group.choices {
+        let Some(overall) = &choice.overall else { continue };
+        let n = choice.points.len() as f64;
+        let mean = |of: &dyn Fn(&ChartError) -> f64| {
+            format!("{:.4}", choice.points.iter().map(|p| of(&p.error)).sum::<f64>() / n)
+        };
+        let root = |of: &dyn Fn(&ChartError) -> Option<f64>| {
+            let sum: f64 = choice.points.iter().map(|p| of(&p.error).unwrap_or(f64::NAN).powi(2)).sum();
+            format!("{:.4}", (sum / n).sqrt())
+        };
+        let mut cells = vec![format!("`{}`", choice.name), overall.frame_ms.map_or("-".into(), number)];
+        if is_light {
+            cells.push(root(&|e| e.relative_rmse_to_surface));
+            cells.push(root(&|e| e.relative_rmse_to_screen));
+        }
+        cells.push(mean(&|e| e.flip_mean));
+        cells.push(mean(&|e| e.flip_99));
+        cells.push(format!("{:.4}", overall.worst));
+        cells.push(if overall.is_on_front { "yes" } else { "" }.into());
+        say!("| {} |", cells.join(" | "));
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use rubor::auto::{Auto, Bound, Calibration};
 use rubor::inputs::{self, LoadedHead};
 use rubor::job::FrameList;
 use rubor::notes::Note;
@@ -56,6 +57,13 @@ pub(crate) struct Changes {
     /// Draw a map of the (first) head's current state into a corner
     #[arg(long, value_enum, value_name = "MAP")]
     inset: Option<inset::Map>,
+    /// Choose the cheapest settings for each frame whose visible error stays under a bound, such as flip=0.02 (mean FLIP over
+    /// the head against full quality); settings given by flags stay
+    #[arg(long, value_name = "flip=X", value_parser = parse_error)]
+    max_error: Option<Bound>,
+    /// Choose the most exact settings for each frame that fit into a time, in milliseconds
+    #[arg(long, value_name = "MS", conflicts_with = "max_error", value_parser = parse_budget)]
+    budget_ms: Option<Bound>,
     /// Draw only these frames, such as 1,12-20 (the first is 1); makes no video
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
@@ -138,8 +146,26 @@ impl Contents {
     }
 }
 
+fn parse_error(text: &str) -> Result<Bound, String> {
+    match text.parse() {
+        Ok(bound @ Bound::Flip(_)) => Ok(bound),
+        _ => Err(format!("found {text:?}, expected flip=X with X above 0, such as flip=0.02")),
+    }
+}
+
+fn parse_budget(text: &str) -> Result<Bound, String> {
+    format!("ms={text}")
+        .parse()
+        .map_err(|_| format!("found {text:?}, expected milliseconds above 0, such as 1.5"))
+}
+
 impl Changes {
     fn apply(&self, job: &mut Job) -> Outcome {
+        if let Some(bound) = self.max_error.or(self.budget_ms) {
+            let devices = rubor::studio::adapters();
+            let calibration = Calibration::of_devices(devices.iter().map(|d| d.name.as_str()))?;
+            job.auto = Some(Auto { bound, held: self.settings.given(), calibration });
+        }
         self.settings.overlay(&mut job.settings)?;
         job.sequence.fps = self.fps.unwrap_or(job.sequence.fps);
         job.inset = self.inset.or(job.inset);

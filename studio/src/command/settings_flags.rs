@@ -36,6 +36,16 @@ pub(crate) struct SettingsFlags<P> {
     purpose: PhantomData<P>,
 }
 
+/// A base and what varies around it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Choices {
+    pub(crate) base: Settings,
+    /// Flags with their values.
+    pub(crate) listed: Vec<(String, Vec<Value>)>,
+    /// Flags that were given with one value.
+    pub(crate) held: Vec<String>,
+}
+
 /// A setting with the strings in the form that clap needs.
 struct Flag {
     leaf: &'static Leaf,
@@ -138,6 +148,11 @@ impl<P: Purpose> SettingsFlags<P> {
         self.preset
     }
 
+    /// Names of the flags that were given.
+    pub(crate) fn given(&self) -> Vec<String> {
+        self.given.iter().map(|(leaf, _)| leaf.flag()).collect()
+    }
+
     /// Puts the flags that were given over settings.
     pub(crate) fn overlay(&self, settings: &mut Settings) -> Outcome {
         for (leaf, values) in &self.given {
@@ -155,6 +170,22 @@ impl<P: Purpose> SettingsFlags<P> {
         settings.output.size = size.unwrap_or(settings.output.size);
         self.overlay(&mut settings)?;
         Ok(settings)
+    }
+
+    /// The settings of all flags with one value, the flags with several values, and those that were given with one.
+    pub(crate) fn choices(&self) -> Outcome<Choices> {
+        let mut base = Settings::default();
+        for list in self.lists()? {
+            if let [change] = &list[..] {
+                base.overlay(change)?;
+            }
+        }
+        let (held, listed): (Vec<_>, Vec<_>) = self.given.iter().partition(|(_, values)| values.len() == 1);
+        Ok(Choices {
+            base,
+            listed: listed.into_iter().map(|(leaf, values)| (leaf.flag(), values.clone())).collect(),
+            held: held.into_iter().map(|(leaf, _)| leaf.flag()).collect(),
+        })
     }
 
     /// Every combination of the lists.
@@ -291,6 +322,21 @@ mod tests {
         assert!(found.iter().all(|s| s.output.size == [32, 24] && s.output.channels.len() == 2));
         assert_eq!(all(&["--preset", "draft"]).len(), 1, "a preset is one choice of quality");
         assert_eq!(all(&["--size", "8x8,9x9"]).len(), 4);
+    }
+
+    #[test]
+    fn one_value_is_held_and_several_vary() {
+        let arguments = ["--scatter", "none,separable:5", "--transmit", "none", "--shadow-size", "64"];
+        let found = parsed::<Many>(&arguments).unwrap().choices().unwrap();
+        assert_eq!(found.base.quality.transmit.to_string(), "none");
+        assert_eq!((found.base.quality.shadow_size, found.base.output.size), (64, [32, 24]));
+        assert_eq!(
+            found.base.quality.scatter,
+            Settings::default().quality.scatter,
+            "what varies is not in the base"
+        );
+        assert_eq!(found.listed, [("scatter".to_owned(), vec!["none".into(), "separable:5".into()])]);
+        assert!(found.held.contains(&"transmit".to_owned()) && !found.held.contains(&"size".to_owned()));
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub fn run(
                 name = format!("{name}, heads {heads}");
             }
             let times = studio.measure(&shots, spacing_m, settings, frames.warm_up, frames.timed)?;
-            let frame = summary("frame", 1, times.iter().map(|t| t.frame_ms).collect());
+            let frame = PassCost::of("frame", 1, times.iter().map(|t| t.frame_ms).collect());
             let row = BenchRow { name, settings: settings.clone(), heads, frame, passes: passes(&times) };
             told(&row, studio, &shots)?;
             rows.push(row);
@@ -85,15 +85,13 @@ fn passes(times: &[FrameTimes]) -> Vec<PassCost> {
     names
         .into_iter()
         .map(|name| {
-            summary(name, of(first, name).len(), times.iter().map(|t| of(t, name).iter().sum()).collect())
+            PassCost::of(
+                name,
+                of(first, name).len(),
+                times.iter().map(|t| of(t, name).iter().sum()).collect(),
+            )
         })
         .collect()
-}
-
-fn summary(name: &str, runs: usize, mut ms: Vec<f64>) -> PassCost {
-    ms.sort_by(f64::total_cmp);
-    let at = |share: f64| ms.get(((ms.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(0.0);
-    PassCost { name: name.to_owned(), runs, median: at(0.5), p10: at(0.1), p90: at(0.9) }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod chart;
 pub mod difference;
+pub mod stability;
 
 use rubor_assets::files::plain_names;
 use rubor_renderer::settings::{Leaf, Settings, leaves};

@@ -1,0 +1,324 @@
+//! Settings by need: for every frame the cheapest choices whose estimated error stays under a bound, or the most exact ones
+//! that fit into a time.
+//!
+//! ```text
+//! Shot --Outline--> Features --Calibration--> error and cost of each choice \
+//!                                             bound, choices of the frame before / --> choices of the frame, and why
+//! ```
+//!
+//! The error is the mean FLIP over the head against the same frame with the last choice of every group; errors of groups add
+//! up. Choices follow from the sequence alone, frame by frame from the first: any part of a job, on any machine, draws the
+//! frames of the whole. The estimates are those of one device ([`Calibration`]); the job holds them.
+//!
+//! A frame has one choice for all of its heads: that of the head with the largest error.
+
+pub mod calibration;
+pub mod experiment;
+mod features;
+mod shots;
+
+use std::path::PathBuf;
+
+use rubor_renderer::settings::{Settings, leaves};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+pub use calibration::Calibration;
+pub use features::{Features, Outline};
+pub use shots::{CALIBRATED, calibrated, random_shots};
+
+use crate::error::Outcome;
+use crate::measure::file_name;
+use crate::output;
+
+/// The measurements that ship with rubor: made by `rubor chart --calibrate` (docs/auto.md says where and when).
+const SHIPPED: &str = include_str!("h200.json");
+
+/// A choice stays while it keeps the bound, unless a cheaper one keeps this share of it.
+const HYSTERESIS: f64 = 0.85;
+
+/// What limits a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub enum Bound {
+    /// Mean FLIP over the head, above 0.
+    Flip(f64),
+    /// Milliseconds of a frame, above 0.
+    Milliseconds(f64),
+}
+
+impl std::str::FromStr for Bound {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("found {text:?}, expected flip=X or ms=X with X above 0, such as flip=0.02");
+        let (name, number) = text.split_once('=').ok_or_else(wrong)?;
+        let number: f64 =
+            number.trim().parse().ok().filter(|n: &f64| *n > 0.0 && n.is_finite()).ok_or_else(wrong)?;
+        match name.trim() {
+            "flip" => Ok(Self::Flip(number)),
+            "ms" => Ok(Self::Milliseconds(number)),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+impl std::fmt::Display for Bound {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Flip(most) => write!(f, "flip={most}"),
+            Self::Milliseconds(most) => write!(f, "ms={most}"),
+        }
+    }
+}
+
+/// Settings by need.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
+pub struct Auto {
+    /// What limits a frame.
+    pub bound: Bound,
+    /// Flags of settings that stay as they are.
+    #[serde(default)]
+    pub held: Vec<String>,
+    /// Estimates of a device.
+    #[schemars(with = "serde_json::Value")]
+    pub calibration: Calibration,
+}
+
+/// What was chosen for a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct Chosen {
+    /// Index of the choice of each group of the calibration; of a held group none.
+    pub choices: Vec<Option<usize>>,
+    /// Estimated mean FLIP, which 95 % of frames do not exceed.
+    pub flip: f64,
+    /// Estimated milliseconds.
+    pub milliseconds: f64,
+    /// Whether the bound is kept by that estimate.
+    pub is_kept: bool,
+}
+
+impl Calibration {
+    /// The one that ships with rubor.
+    ///
+    /// # Errors
+    /// It does not read, which a test excludes.
+    pub fn shipped() -> Outcome<Self> {
+        serde_json::from_str(SHIPPED).map_err(crate::Failure::job)
+    }
+
+    /// That of the best of some devices for which one was kept, else the one that ships.
+    ///
+    /// # Errors
+    /// As [`Calibration::shipped`].
+    pub fn of_devices<'a>(names: impl IntoIterator<Item = &'a str>) -> Outcome<Self> {
+        let kept = names.into_iter().find_map(|name| {
+            let bytes = rubor_rig::limits::read(&kept_file(name)?).ok()?;
+            serde_json::from_slice(&bytes).ok().filter(|c: &Self| c.rubor == env!("CARGO_PKG_VERSION"))
+        });
+        kept.map_or_else(Self::shipped, Ok)
+    }
+
+    /// Keeps it for its device; returns the file, or none where the system names no folder for such data.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn keep(&self) -> Outcome<Option<PathBuf>> {
+        let Some(file) = kept_file(&self.adapter.name) else { return Ok(None) };
+        if let Some(folder) = file.parent() {
+            output::folder(folder)?;
+        }
+        output::write_json(&file, self)?;
+        Ok(Some(file))
+    }
+}
+
+fn kept_file(device: &str) -> Option<PathBuf> {
+    let name = file_name(&format!("auto-{device}.json"));
+    directories::ProjectDirs::from("", "", "rubor").map(|dirs| dirs.data_dir().join(name))
+}
+
+impl Auto {
+    /// Choices for a frame after those of the frame before, for heads with these features.
+    pub fn choose(&self, heads: &[Features], size: [u32; 2], before: Option<&Chosen>) -> Chosen {
+        let groups: Vec<Vec<Option<usize>>> = (self.calibration.groups.iter())
+            .map(|g| {
+                if self.held.contains(&g.flag) {
+                    vec![None]
+                } else {
+                    (0..g.choices.len()).map(Some).collect()
+                }
+            })
+            .collect();
+        // Every group on its own: errors and costs add up.
+        let table: Vec<Vec<(Option<usize>, f64, f64)>> = (groups.iter().enumerate())
+            .map(|(g, choices)| {
+                choices
+                    .iter()
+                    .map(|c| {
+                        let error = |f: &Features| c.map_or(0.0, |c| self.calibration.error(g, c, f));
+                        let cost = |f: &Features| c.map_or(0.0, |c| self.calibration.cost_ms(g, c, f, size));
+                        (*c, heads.iter().map(error).fold(0.0, f64::max), heads.iter().map(cost).sum())
+                    })
+                    .collect()
+            })
+            .collect();
+        let base: f64 = heads.iter().map(|f| self.calibration.base_ms(f, size)).fold(0.0, f64::max);
+        let mut all = vec![Chosen { choices: Vec::new(), flip: 0.0, milliseconds: base, is_kept: true }];
+        for group in &table {
+            let mut next = Vec::with_capacity(all.len() * group.len());
+            for chosen in &all {
+                for (choice, error, cost) in group {
+                    let mut chosen = chosen.clone();
+                    chosen.choices.push(*choice);
+                    chosen.flip += error;
+                    chosen.milliseconds += cost;
+                    next.push(chosen);
+                }
+            }
+            all = next;
+        }
+        for chosen in &mut all {
+            chosen.is_kept = match self.bound {
+                Bound::Flip(most) => chosen.flip <= most,
+                Bound::Milliseconds(most) => chosen.milliseconds <= most,
+            };
+        }
+        let stays = before.and_then(|b| all.iter().find(|c| c.choices == b.choices && c.is_kept));
+        // What is better: cheaper under a bound of error, more exact under one of time; the nearest where nothing keeps it.
+        let (limit, better): (f64, fn(&Chosen) -> (f64, f64)) = match self.bound {
+            Bound::Flip(most) => (most, |c| (c.milliseconds, c.flip)),
+            Bound::Milliseconds(most) => (most, |c| (c.flip, c.milliseconds)),
+        };
+        let used = |c: &Chosen| if matches!(self.bound, Bound::Flip(_)) { c.flip } else { c.milliseconds };
+        let order = |a: &&Chosen, b: &&Chosen| {
+            let (a, b) = (better(a), better(b));
+            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+        };
+        let share = if stays.is_some() { HYSTERESIS } else { 1.0 };
+        let best = all.iter().filter(|c| used(c) <= limit * share).min_by(order);
+        let chosen = match (stays, best) {
+            (Some(stays), Some(best)) if better(best).0 < better(stays).0 => best,
+            (Some(stays), _) => stays,
+            (None, Some(best)) => best,
+            (None, None) => match all.iter().min_by(|a, b| used(a).total_cmp(&used(b))) {
+                Some(nearest) => nearest,
+                None => return Chosen { choices: Vec::new(), flip: 0.0, milliseconds: base, is_kept: true },
+            },
+        };
+        chosen.clone()
+    }
+
+    /// Settings with what was chosen.
+    ///
+    /// # Errors
+    /// A calibration with values that the settings refuse.
+    pub fn settings(&self, base: &Settings, chosen: &Chosen) -> Outcome<Settings> {
+        let mut settings = base.clone();
+        for (group, choice) in self.calibration.groups.iter().zip(&chosen.choices) {
+            let leaf = leaves().iter().find(|leaf| leaf.flag() == group.flag);
+            if let (Some(leaf), Some(choice)) = (leaf, choice.and_then(|c| group.choices.get(c))) {
+                settings.overlay(&json!({ &leaf.path[0]: { &leaf.path[1]: choice.value } }))?;
+            }
+        }
+        settings.validate()?;
+        Ok(settings)
+    }
+
+    /// Choices for frames one after the other; each has the features of every head.
+    pub fn run(&self, frames: impl Iterator<Item = Vec<Features>>, size: [u32; 2]) -> Vec<Chosen> {
+        let mut all: Vec<Chosen> = Vec::new();
+        for heads in frames {
+            let chosen = self.choose(&heads, size, all.last());
+            all.push(chosen);
+        }
+        all
+    }
+
+    /// What was chosen, in words.
+    pub fn words(&self, chosen: &Chosen) -> String {
+        let of = |(group, choice): (&calibration::Group, &Option<usize>)| {
+            choice.and_then(|c| group.choices.get(c)).map(|c| format!("{} {}", group.flag, c.name))
+        };
+        let names: Vec<String> = self.calibration.groups.iter().zip(&chosen.choices).filter_map(of).collect();
+        let kept = if chosen.is_kept { "" } else { "; no choice keeps the bound, this one comes nearest" };
+        format!("{}: FLIP {:.4}, {:.2} ms{kept}", names.join(", "), chosen.flip, chosen.milliseconds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn auto(bound: Bound) -> Auto {
+        Auto { bound, held: Vec::new(), calibration: Calibration::shipped().unwrap() }
+    }
+
+    const NEAR: Features =
+        Features { mm_per_pixel: 0.25, share: 0.6, backlight: 0.1, contrast: 0.8, wrinkles: 0.0, blood: 0.0 };
+
+    #[test]
+    fn a_smaller_bound_costs_more_and_errs_less() {
+        let size = [1920, 1080];
+        let of = |most: f64| auto(Bound::Flip(most)).choose(&[NEAR], size, None);
+        let (loose, tight) = (of(0.2), of(0.01));
+        assert!(loose.milliseconds < tight.milliseconds && loose.flip > tight.flip, "{loose:?} {tight:?}");
+        assert!(loose.is_kept && loose.flip <= 0.2);
+        let slow = auto(Bound::Milliseconds(100.0)).choose(&[NEAR], size, None);
+        let fast = auto(Bound::Milliseconds(loose.milliseconds)).choose(&[NEAR], size, None);
+        assert!(slow.flip < fast.flip, "{slow:?} {fast:?}");
+        let never = auto(Bound::Milliseconds(1e-6)).choose(&[NEAR], size, None);
+        assert!(!never.is_kept);
+    }
+
+    #[test]
+    fn what_a_face_does_not_do_is_left_out() {
+        let auto = auto(Bound::Flip(0.03));
+        let settings = |f: Features| {
+            auto.settings(&Settings::default(), &auto.choose(&[f], [1280, 720], None)).unwrap().quality
+        };
+        let calm = settings(NEAR);
+        assert_eq!((calm.wrinkles.name(), calm.color.name()), ("none", "static"));
+        let acting = settings(Features { wrinkles: 1.0, blood: 1.0, ..NEAR });
+        assert_eq!((acting.wrinkles.name(), acting.color.name()), ("partial-derivative", "hemoglobin"));
+    }
+
+    #[test]
+    fn choices_do_not_swing_to_and_fro() {
+        let auto = auto(Bound::Flip(0.03));
+        let size = [1280, 720];
+        let mut before: Option<Chosen> = None;
+        let (mut changes, mut free) = (0, 0);
+        let mut last_free: Option<Chosen> = None;
+        for i in 0..400 {
+            // A slow zoom with a tremble.
+            let tremble = if i % 2 == 0 { 1.04 } else { 1.0 };
+            let f = Features { mm_per_pixel: 0.1 * 1.01f64.powi(i) * tremble, ..NEAR };
+            let chosen = auto.choose(&[f], size, before.as_ref());
+            let alone = auto.choose(&[f], size, None);
+            changes += usize::from(before.as_ref().is_some_and(|b| b.choices != chosen.choices));
+            free += usize::from(last_free.as_ref().is_some_and(|b| b.choices != alone.choices));
+            assert!(chosen.is_kept || !alone.is_kept, "the bound comes first");
+            (before, last_free) = (Some(chosen), Some(alone));
+        }
+        assert!(changes <= 12 && changes < free, "{changes} changes, {free} without memory");
+    }
+
+    #[test]
+    fn held_settings_stay_and_bounds_read_back() {
+        let mut auto = auto("flip=0.5".parse().unwrap());
+        auto.held = vec!["scatter".to_owned()];
+        let base = Settings::default();
+        let settings = auto.settings(&base, &auto.choose(&[NEAR], [640, 640], None)).unwrap();
+        assert_eq!(settings.quality.scatter, base.quality.scatter);
+        for text in ["flip=0.02", "ms=1.5"] {
+            assert_eq!(text.parse::<Bound>().unwrap().to_string(), text);
+        }
+        for wrong in ["", "flip", "flip=0", "ms=-1", "ms=nan", "psnr=3"] {
+            assert!(wrong.parse::<Bound>().unwrap_err().contains("expected flip=X"), "{wrong}");
+        }
+    }
+}
