@@ -125,10 +125,10 @@ impl Passes {
         needs: &Needs,
     ) -> Result<(), RenderError> {
         let has_holes = scene.heads.iter().any(|h| h.head.cut_triangles > 0);
-        self.visibility.prepare(gpu, settings.frame_size(), has_holes);
+        self.visibility.prepare(gpu, settings.frame_size(), scene.heads.len(), has_holes);
         // One more than the scene has: a dark lamp may be added for transmittance.
         let lights = (scene.lights.len() + 1).min(MAX_LIGHTS);
-        self.shadow.prepare(gpu, lights, settings.quality.shadow_size, has_holes);
+        self.shadow.prepare(gpu, lights, settings.quality.shadow_size, scene.heads.len(), has_holes);
         let wanted = settings.antialias();
         let size = settings.output.size;
         if wanted.mode == antialias::Mode::None {

@@ -5,6 +5,8 @@
 //! Least squares with a small ridge; a margin on top covers 95 % of the shots, each predicted without itself. The cost over
 //! that of the cheapest choice is linear in the pixels of the head.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -132,27 +134,22 @@ fn line(points: &[(f64, f64)]) -> [f64; 2] {
 }
 
 impl Calibration {
-    /// Fits a chart of shots whose features are known; none if a group has too few shots with times.
-    pub fn of(report: &ChartReport, features: &[Features]) -> Option<Self> {
-        let size = report.settings.output.size;
+    /// Fits a chart of shots whose features are known to their times, in one or more sizes of pictures; none if a group has
+    /// too few shots or no times.
+    pub fn of(report: &ChartReport, features: &[Features], times: &[Times]) -> Option<Self> {
         let mut groups = Vec::new();
-        for group in &report.groups {
+        for (g, group) in report.groups.iter().enumerate() {
             let drive = match group.flag.as_str() {
                 "wrinkles" => Drive::Wrinkles,
                 "color" => Drive::Blood,
                 _ => Drive::Nothing,
             };
-            let first =
-                group.choices.iter().find(|c| c.overall.as_ref().is_some_and(|o| o.frame_ms.is_some()))?;
-            let ms = |choice: &crate::report::ChartChoice| -> Option<Vec<f64>> {
-                choice.points.iter().map(|p| p.frame.as_ref().map(|f| f.median)).collect()
-            };
-            let first_ms = ms(first)?;
+            let is_timed = |c: usize| times.iter().all(|t| t.ms.contains_key(&[g, c, 0]));
+            let first = (0..group.choices.len()).find(|c| is_timed(*c))?;
             let mut choices = Vec::new();
-            for choice in &group.choices {
-                let Some(own_ms) = ms(choice) else { continue };
+            for (c, choice) in group.choices.iter().enumerate().filter(|(c, _)| is_timed(*c)) {
                 let rows: Vec<([f64; TERMS], f64)> = (choice.points.iter().zip(features))
-                    .filter(|(_, f)| f.share > 0.0 && drive.of(f) >= LEAST_DRIVE.min(1.0))
+                    .filter(|(_, f)| f.share > 0.0 && drive.of(f) >= LEAST_DRIVE)
                     .map(|(p, f)| {
                         let error = p.error.of(Measure::Picture) / drive.of(f);
                         (terms(f), error.max(LEAST_ERROR).ln())
@@ -173,22 +170,20 @@ impl Calibration {
                     });
                     (Some(model), quantile(left_out.collect(), COVERED).max(0.0))
                 };
-                let over = own_ms.iter().zip(&first_ms).map(|(own, first)| own - first);
-                let places = features.iter().map(|f| megapixels(f, size));
                 choices.push(Choice {
                     value: value_of(&choice.settings, &group.flag)?,
                     name: choice.name.clone(),
                     error,
                     margin,
-                    cost_ms: line(&places.zip(over).collect::<Vec<_>>()),
+                    cost_ms: line(&over(times, features, |s| [[g, c, s], [g, first, s]])),
                 });
             }
             groups.push(Group { flag: group.flag.clone(), drive, choices });
         }
         // A frame of the base, less what its choices cost over the first ones.
-        let base = report.groups.iter().flat_map(|g| &g.choices).find(|c| c.settings == report.settings)?;
-        let base_ms: Vec<f64> =
-            base.points.iter().map(|p| p.frame.as_ref().map(|f| f.median)).collect::<Option<_>>()?;
+        let [g, c] = (report.groups.iter().enumerate()).find_map(|(g, group)| {
+            Some([g, group.choices.iter().position(|c| c.settings == report.settings)?])
+        })?;
         let mut calibration = Self {
             adapter: report.adapter.clone(),
             rubor: env!("CARGO_PKG_VERSION").to_owned(),
@@ -196,15 +191,18 @@ impl Calibration {
             base_ms: [0.0; 2],
             groups,
         };
-        let firsts = features.iter().zip(base_ms).map(|(f, ms)| {
-            let over = calibration.groups.iter().enumerate().map(|(g, group)| {
-                let value = value_of(&report.settings, &group.flag);
-                let choice = group.choices.iter().position(|c| Some(&c.value) == value.as_ref());
-                choice.map_or(0.0, |c| calibration.cost_ms(g, c, f, size))
-            });
-            (megapixels(f, size), ms - over.sum::<f64>())
-        });
-        let places: Vec<(f64, f64)> = firsts.collect();
+        let mut places = Vec::new();
+        for times in times {
+            for (s, f) in features.iter().enumerate() {
+                let extra = calibration.groups.iter().enumerate().map(|(g, group)| {
+                    let value = value_of(&report.settings, &group.flag);
+                    let choice = group.choices.iter().position(|c| Some(&c.value) == value.as_ref());
+                    choice.map_or(0.0, |c| calibration.cost_ms(g, c, f, times.size))
+                });
+                let ms = times.ms.get(&[g, c, s])?;
+                places.push((megapixels(f, times.size), ms - extra.sum::<f64>()));
+            }
+        }
         calibration.base_ms = line(&places);
         Some(calibration)
     }
@@ -233,6 +231,29 @@ impl Calibration {
     pub fn base_ms(&self, f: &Features, size: [u32; 2]) -> f64 {
         (self.base_ms[0] + self.base_ms[1] * megapixels(f, size)).max(0.0)
     }
+}
+
+/// Times of the choices of a chart in a size of pictures, by group, choice and shot.
+#[derive(Clone, Debug)]
+pub struct Times {
+    /// Pixels.
+    pub size: [u32; 2],
+    /// Milliseconds.
+    pub ms: BTreeMap<[usize; 3], f64>,
+}
+
+/// Millions of pixels and milliseconds of a choice over another, for each size and shot.
+fn over(times: &[Times], features: &[Features], pair: impl Fn(usize) -> [[usize; 3]; 2]) -> Vec<(f64, f64)> {
+    let mut all = Vec::new();
+    for times in times {
+        for (s, f) in features.iter().enumerate() {
+            let [own, first] = pair(s);
+            if let (Some(own), Some(first)) = (times.ms.get(&own), times.ms.get(&first)) {
+                all.push((megapixels(f, times.size), own - first));
+            }
+        }
+    }
+    all
 }
 
 /// The value of a flag in settings.

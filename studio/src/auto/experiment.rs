@@ -7,8 +7,9 @@
 
 use rubor_assets::compare::{Pixels, flip, mean_and_percentile};
 use rubor_renderer::channels::Channel;
-use rubor_renderer::settings::Settings;
+use rubor_renderer::settings::{AntialiasMethod, ScatterMethod, Settings};
 use rubor_rig::head::Head;
+use serde::Serialize;
 
 use super::{Auto, Bound, Chosen, Features, Outline};
 use crate::error::{Failure, Outcome};
@@ -28,27 +29,31 @@ pub struct Timing {
 }
 
 /// Errors and times of every combination, for each scene.
-struct Measured {
-    combinations: Vec<Vec<Option<usize>>>,
-    /// By combination and scene.
-    errors: Vec<Vec<f64>>,
-    ms: Vec<Vec<f64>>,
+#[derive(Clone, Debug, Serialize)]
+pub struct Measured {
+    /// Features of each scene.
+    pub features: Vec<Features>,
+    /// Index of the choice of each group of the calibration; of a held group none.
+    pub combinations: Vec<Vec<Option<usize>>>,
+    /// Mean FLIP by combination and scene.
+    pub errors: Vec<Vec<f64>>,
+    /// Milliseconds by combination and scene.
+    pub ms: Vec<Vec<f64>>,
 }
 
-/// Judges `auto` under each bound of error in scenes of a head.
+/// Draws and times every combination of choices in scenes of a head.
 ///
 /// # Errors
 /// A device without timestamps; errors of the studio.
-pub fn run(
+pub fn measured(
     studio: &mut Studio,
     head: &Head,
     base: &Settings,
     scenes: &[Scene],
     auto: &Auto,
-    bounds: &[f64],
     timing: Timing,
     watch: &mut dyn Watch,
-) -> Outcome<AutoReport> {
+) -> Outcome<Measured> {
     if !studio.has_timestamps() {
         let Adapter { name, .. } = studio.adapter();
         return Err(Failure::job(format!("{name} has no timestamps, so choices cannot be timed")));
@@ -56,22 +61,33 @@ pub fn run(
     let outline = Outline::of(head);
     let size = base.output.size;
     let features: Vec<Features> = scenes.iter().map(|s| outline.features(&s.shot, size)).collect();
-    let measured = measure(studio, base, scenes, auto, timing, watch)?;
+    measure(studio, base, scenes, (auto, features), timing, watch)
+}
+
+/// Judges `auto` under each bound of error by what was measured with a base of settings.
+pub fn judged(
+    adapter: Adapter,
+    base: &Settings,
+    scenes: &[Scene],
+    auto: &Auto,
+    bounds: &[f64],
+    measured: &Measured,
+) -> AutoReport {
     let rows = bounds
         .iter()
         .map(|bound| {
             let auto = Auto { bound: Bound::Flip(*bound), ..auto.clone() };
-            let chosen: Vec<Chosen> = features.iter().map(|f| auto.choose(&[*f], size, None)).collect();
-            row(*bound, &measured, &chosen)
+            let choose = |f: &Features| auto.choose(&[*f], base.output.size, None);
+            row(*bound, measured, &measured.features.iter().map(choose).collect::<Vec<_>>())
         })
         .collect();
-    Ok(AutoReport {
-        adapter: studio.adapter(),
+    AutoReport {
+        adapter,
         settings: base.clone(),
         scenes: scenes.iter().map(|s| s.name.clone()).collect(),
         combinations: measured.combinations.len(),
         rows,
-    })
+    }
 }
 
 fn row(bound: f64, measured: &Measured, chosen: &[Chosen]) -> AutoRow {
@@ -125,7 +141,7 @@ fn measure(
     studio: &mut Studio,
     base: &Settings,
     scenes: &[Scene],
-    auto: &Auto,
+    (auto, features): (&Auto, Vec<Features>),
     timing: Timing,
     watch: &mut dyn Watch,
 ) -> Outcome<Measured> {
@@ -135,10 +151,14 @@ fn measure(
         auto.settings(base, &chosen)
     };
     let all: Vec<Settings> = combinations.iter().map(settings).collect::<Outcome<_>>()?;
-    let Some(right) = all.last() else { return Err(Failure::input("there is nothing to choose")) };
+    let Some(mut right) = all.last().cloned() else {
+        return Err(Failure::input("there is nothing to choose"));
+    };
+    right.quality.scatter = ScatterMethod::Separable(65);
+    right.quality.antialias = AntialiasMethod::Ssaa(8);
     let mut truths: Vec<(Pixels, Vec<bool>)> = Vec::new();
     for scene in scenes {
-        truths.push(truth(studio, scene, right)?);
+        truths.push(truth(studio, scene, &right)?);
     }
     watch.begin("combinations", all.len() as u64);
     let mut errors = Vec::new();
@@ -167,7 +187,7 @@ fn measure(
     watch.end();
     let medians =
         |times: Vec<Vec<f64>>| times.into_iter().map(|mut t| median(&mut t).unwrap_or(0.0)).collect();
-    Ok(Measured { combinations, errors, ms: times.into_iter().map(medians).collect() })
+    Ok(Measured { features, combinations, errors, ms: times.into_iter().map(medians).collect() })
 }
 
 /// The right picture of a scene, and the pixels of the head and those around.
@@ -209,6 +229,7 @@ mod tests {
         let combinations = vec![vec![Some(0)], vec![Some(1)], vec![Some(2)]];
         // Two scenes; the third combination is right and dear, the second keeps the bound in the first scene.
         let measured = Measured {
+            features: Vec::new(),
             combinations,
             errors: vec![vec![0.5, 0.5], vec![0.01, 0.1], vec![0.0, 0.0]],
             ms: vec![vec![1.0, 1.0], vec![2.0, 2.0], vec![4.0, 4.0]],

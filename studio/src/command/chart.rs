@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use rubor::auto::calibration::Times;
 use rubor::auto::{self, Auto, Bound, Calibration, experiment};
 use rubor::measure::chart::{self, Effort, Measure, Options, Suite, Timing, page, plot::number};
 use rubor::measure::stability;
@@ -59,7 +60,8 @@ pub(crate) struct Arguments {
     /// Random shots of --calibrate [default: 64; 24 for quick]
     #[arg(long, value_name = "N", requires = "calibrate", value_parser = clap::value_parser!(u32).range(16..=4096))]
     shots: Option<u32>,
-    /// In place of a chart: how well --max-error chooses in the suite's scenes, beside every fixed setting
+    /// In place of a chart: how well --max-error chooses in the suite's scenes, beside every fixed setting; what flags say is not
+    /// chosen
     #[arg(long, conflicts_with_all = ["sequence", "stability", "calibrate"])]
     auto: bool,
     /// Print JSON
@@ -100,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         return calibrate(arguments, &mut studio, &loaded.head, &rig, &base, is_quick);
     }
     if arguments.auto {
-        return judge(arguments, &mut studio, &loaded.head, &rig, &base, suite);
+        return judge(arguments, &mut studio, &loaded.head, &rig, (&base, held), suite);
     }
     let groups = chart::groups(suite, &base, &listed, &held, effort)?;
     let frames = arguments.frames.unwrap_or(frames);
@@ -171,20 +173,31 @@ fn calibrate(
     let groups = chart::groups(Suite::Whole, base, &listed, &[], effort)?;
     let frames = arguments.frames.unwrap_or(if is_quick { 2 } else { 20 });
     let timing = Timing { rounds: arguments.rounds, warm_up: frames.div_ceil(2), frames };
-    let options = Options { timing: Some(timing), folder: None, light: false };
     studio.set_heads([head])?;
     let mut progress = Progress::default();
+    let options = Options { timing: None, folder: None, light: false };
     let report = chart::run(studio, base, &scenes, &groups, &options, &mut progress);
     progress.end();
     let report = report?;
+    // Times in two sizes: what a pixel costs, and what a frame costs without any.
+    let mut times = Vec::new();
+    for size in [base.output.size, if is_quick { [256, 256] } else { [1280, 720] }] {
+        let mut sized = base.clone();
+        sized.output.size = size;
+        let groups = chart::groups(Suite::Whole, &sized, &listed, &[], effort)?;
+        let ms = chart::times(studio, &scenes, &groups, timing, &mut progress);
+        progress.end();
+        times.push(Times { size, ms: ms? });
+    }
     let outline = auto::Outline::of(head);
     let features: Vec<_> = scenes.iter().map(|s| outline.features(&s.shot, base.output.size)).collect();
-    let calibration = Calibration::of(&report, &features)
+    let calibration = Calibration::of(&report, &features, &times)
         .ok_or_else(|| rubor::Failure::job("the shots do not suffice for estimates").hint("more --shots"))?;
     let kept = calibration.keep()?;
     if let Some(folder) = &arguments.output {
         output::folder(folder)?;
         output::write_json(&folder.join("auto.json"), &calibration)?;
+        output::write_json(&folder.join("auto-shots.json"), &(&features, &Report::Chart(report.clone())))?;
     }
     if arguments.json {
         return print_json(&calibration);
@@ -205,26 +218,24 @@ fn judge(
     studio: &mut Studio,
     head: &Head,
     rig: &Rig,
-    base: &Settings,
+    (base, held): (&Settings, Vec<String>),
     suite: Suite,
 ) -> Outcome {
     let (scenes, notes) = chart::scenes(suite, head, rig)?;
     console::notes(&notes);
     let name = studio.adapter().name;
-    let auto = Auto {
-        bound: Bound::Flip(1.0),
-        held: Vec::new(),
-        calibration: Calibration::of_devices([name.as_str()])?,
-    };
+    let auto = Auto { bound: Bound::Flip(1.0), held, calibration: Calibration::of_devices([name.as_str()])? };
     let timing = experiment::Timing { rounds: 2, frames: arguments.frames.unwrap_or(5).max(1) };
     studio.set_heads([head])?;
     let mut progress = Progress::default();
-    let report = experiment::run(studio, head, base, &scenes, &auto, &BOUNDS, timing, &mut progress);
+    let measured = experiment::measured(studio, head, base, &scenes, &auto, timing, &mut progress);
     progress.end();
-    let report = report?;
+    let measured = measured?;
+    let report = experiment::judged(studio.adapter(), base, &scenes, &auto, &BOUNDS, &measured);
     if let Some(folder) = &arguments.output {
         output::folder(folder)?;
         output::write_json(&folder.join("auto-experiment.json"), &Report::Auto(report.clone()))?;
+        output::write_json(&folder.join("auto-measured.json"), &measured)?;
     }
     if arguments.json {
         return print_json(&Report::Auto(report));
@@ -265,14 +276,15 @@ fn tell_stability(arguments: &Arguments, report: StabilityReport) -> Outcome {
         return print_json(&Report::Stability(report));
     }
     say!("{}", stability::page::about(&report));
-    say!("| sweep | choice | residual | jump | halo | energy | broken values | cost spike |");
-    say!("| --- | --- | --- | --- | --- | --- | --- | --- |");
+    say!("| sweep | setting | choice | residual | jump | halo | energy | broken values | cost spike |");
+    say!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for r in &report.rows {
         let spike = r.cost_spike.map_or("-".to_owned(), |v| format!("{v:.2}"));
         let [least, most] = r.energy;
         say!(
-            "| {} | `{}` | {:.4} | {:.2} | {:.4} | {least:.3} to {most:.3} | {} | {spike} |",
+            "| {} | {} | `{}` | {:.4} | {:.2} | {:.4} | {least:.3} to {most:.3} | {} | {spike} |",
             r.sweep,
+            r.group,
             r.choice,
             r.residual,
             r.jump,

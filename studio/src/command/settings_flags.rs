@@ -180,6 +180,14 @@ impl<P: Purpose> SettingsFlags<P> {
                 base.overlay(change)?;
             }
         }
+        // What varies has the command's default in the base.
+        for (leaf, _) in self.given.iter().filter(|(_, values)| values.len() > 1) {
+            let own = P::DEFAULTS.iter().find(|(name, _)| *name == leaf.flag());
+            let values = own.and_then(|(_, text)| parse(leaf, text, P::LISTS).ok()).unwrap_or_default();
+            if let [value] = &values[..] {
+                base.overlay(&change(leaf, value))?;
+            }
+        }
         let (held, listed): (Vec<_>, Vec<_>) = self.given.iter().partition(|(_, values)| values.len() == 1);
         Ok(Choices {
             base,

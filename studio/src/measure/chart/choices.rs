@@ -137,10 +137,8 @@ fn parse(flag: &str, text: &str) -> Outcome<Vec<Value>> {
     first
         .into_iter()
         .chain(rest)
-        .map(|(flag, value)| {
-            let leaf = leaf(flag)?;
-            Ok(change(leaf, &leaf.parse(value).map_err(Failure::input)?))
-        })
+        // Not checked alone: one may only be possible with the other.
+        .map(|(flag, value)| Ok(change(leaf(flag)?, &value.into())))
         .collect()
 }
 

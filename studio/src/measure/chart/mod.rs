@@ -29,9 +29,12 @@ use truth::{Truth, draw, save_light};
 use super::file_name;
 use crate::error::Outcome;
 use crate::output;
-use crate::report::{ChartChoice, ChartGroup, ChartPoint, ChartReport, ChartScene, PassCost};
+use crate::report::{ChartChoice, ChartError, ChartGroup, ChartPoint, ChartReport, ChartScene, PassCost};
 use crate::studio::Studio;
 use crate::watch::Watch;
+
+/// Frames that raise the clock of a graphics card.
+const WAKING_FRAMES: u32 = 600;
 
 /// Repetitions of timing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -221,6 +224,33 @@ fn drawings(groups: &[Group]) -> Vec<Drawing<'_>> {
     all
 }
 
+/// Milliseconds of a frame of each choice of groups in each scene, none for references: by group, choice and scene.
+///
+/// # Errors
+/// Errors of the studio.
+pub fn times(
+    studio: &mut Studio,
+    scenes: &[Scene],
+    groups: &[Group],
+    timing: Timing,
+    watch: &mut dyn Watch,
+) -> Outcome<BTreeMap<[usize; 3], f64>> {
+    let drawings = drawings(groups);
+    let mut points: BTreeMap<[usize; 3], ChartPoint> = BTreeMap::new();
+    let error = ChartError {
+        flip_mean: 0.0,
+        flip_99: 0.0,
+        relative_rmse_to_surface: None,
+        relative_rmse_to_screen: None,
+    };
+    let empty = ChartPoint { error, frame: None, is_on_front: false, picture: None, difference: None };
+    for &[g, c] in drawings.iter().flat_map(|d| &d.places) {
+        points.extend((0..scenes.len()).map(|s| ([g, c, s], empty.clone())));
+    }
+    time(studio, scenes, &drawings, timing, &mut points, watch)?;
+    Ok(points.into_iter().filter_map(|(place, p)| Some((place, p.frame?.median))).collect())
+}
+
 /// Times all settings in all scenes, taking turns.
 fn time(
     studio: &mut Studio,
@@ -236,6 +266,10 @@ fn time(
     };
     let timed: Vec<&Drawing<'_>> = drawings.iter().filter(is_timed).collect();
     let mut all = vec![vec![Vec::new(); scenes.len()]; timed.len()];
+    // An idle device has a low clock.
+    if let (Some(drawing), Some(scene), false) = (timed.first(), scenes.first(), studio.is_software()) {
+        studio.measure(std::slice::from_ref(&scene.shot), 0.0, drawing.settings, WAKING_FRAMES, 1)?;
+    }
     watch.begin("settings timed", u64::from(timing.rounds) * timed.len() as u64);
     for _ in 0..timing.rounds {
         for (drawing, times) in timed.iter().zip(&mut all) {

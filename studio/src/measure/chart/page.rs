@@ -86,6 +86,10 @@ fn overall_plot(report: &ChartReport, g: usize, group: &ChartGroup) -> String {
             None => floor = Some((choice.name.as_str(), overall.error)),
         }
     }
+    // Two points need no picture.
+    if dots.len() < 3 {
+        return String::new();
+    }
     let scenes = report.scenes.len();
     let title = if scenes > 1 { format!("{}, {scenes} scenes", title(group)) } else { title(group) };
     plot::svg(&Plot {
@@ -132,7 +136,8 @@ fn csv(report: &ChartReport) -> String {
         "group,choice,scene,measure,error,relative_rmse_to_surface,relative_rmse_to_screen,flip_mean,flip_99,frame_ms,frame_ms_p10,frame_ms_p90,is_on_front\n",
     );
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
-    let some = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
+    let short = |v: f64| format!("{:.6}", v).trim_end_matches('0').trim_end_matches('.').to_owned();
+    let some = |v: Option<f64>| v.map_or(String::new(), short);
     for group in &report.groups {
         let measure = match group.measure {
             Measure::Light => "light",
@@ -147,11 +152,11 @@ fn csv(report: &ChartReport) -> String {
                     group.flag,
                     quoted(&choice.name),
                     quoted(&scene.name),
-                    e.of(group.measure),
+                    short(e.of(group.measure)),
                     some(e.relative_rmse_to_surface),
                     some(e.relative_rmse_to_screen),
-                    e.flip_mean,
-                    e.flip_99,
+                    short(e.flip_mean),
+                    short(e.flip_99),
                     some(f.map(|f| f.median)),
                     some(f.map(|f| f.p10)),
                     some(f.map(|f| f.p90)),
@@ -196,13 +201,15 @@ fn html(report: &ChartReport, plots: &[String]) -> Outcome<String> {
             measured(group),
             escaped(&group.truth)
         );
+        let is_plotted = !plots[g].is_empty();
+        let is_open = if is_plotted { "" } else { " open" };
         let _ = write!(
             body,
-            "<div class=plot>{}</div><details><summary>All numbers</summary>{}</details>",
+            "<div class=plot>{}</div><details{is_open}><summary>All numbers</summary>{}</details>",
             plots[g],
             table(group)
         );
-        if report.scenes.len() > 1 {
+        if report.scenes.len() > 1 && is_plotted {
             body.push_str("<h3>Scene by scene</h3><div class=scenes>");
             for s in 0..report.scenes.len() {
                 let _ = write!(

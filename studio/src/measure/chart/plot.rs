@@ -44,7 +44,7 @@ pub struct Plot<'a> {
 /// Colours in light and dark, for a file that stands alone.
 pub const COLORS: &str = "svg{--paper:#fff;--ink:#1d1f24;--muted:#6a6f7a;--rule:#d9dbe0;--dot:#8a8f9a;--front:#b3202c}\
 @media(prefers-color-scheme:dark){svg{--paper:#15171b;--ink:#e8e9ec;--muted:#a2a7b2;--rule:#33363d;--dot:#7d828d;--front:#ff7a7a}}\
-svg{font:13px system-ui,sans-serif;background:var(--paper)}text{fill:var(--ink)}";
+svg{font:13px system-ui,sans-serif;background:var(--paper)}text{fill:var(--ink);paint-order:stroke;stroke:var(--paper);stroke-width:3px}";
 
 /// Heights of letters and their mean width, units.
 const LINE: f64 = 15.0;
@@ -97,6 +97,16 @@ impl Scale {
     }
 }
 
+/// Labels of ticks: those of a straight axis have the digits that tell them apart.
+fn tick_labels(ticks: &[f64], is_log: bool) -> Vec<String> {
+    let step = ticks.windows(2).map(|w| (w[1] - w[0]).abs()).fold(f64::INFINITY, f64::min);
+    if is_log || !step.is_finite() || step <= 0.0 {
+        return ticks.iter().map(|v| number(*v)).collect();
+    }
+    let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    ticks.iter().map(|v| format!("{v:.digits$}")).collect()
+}
+
 /// A number in as few digits as say it.
 pub fn number(v: f64) -> String {
     let digits = match v.abs() {
@@ -140,11 +150,11 @@ pub fn svg(plot: &Plot<'_>) -> String {
         _ => (0.1, 1.0, true),
     };
     let [left, top, right, bottom] = if plot.is_labelled {
-        [62.0, 34.0, width - 150.0, height - 46.0]
+        [80.0, 34.0, width - 150.0, height - 46.0]
     } else {
         [34.0, 24.0, width - 8.0, height - 20.0]
     };
-    let is_wide = ms_high / ms_low > 4.0;
+    let is_wide = ms_high / ms_low > 1.8;
     let air =
         if is_wide { (ms_high / ms_low).powf(0.06) } else { 1.0 + 0.08 * (1.0 - ms_low / ms_high) + 0.004 };
     let x = Scale { low: ms_low / air, high: ms_high * air, is_log: is_wide, from: left, to: right };
@@ -167,13 +177,14 @@ pub fn svg(plot: &Plot<'_>) -> String {
         escaped(plot.title)
     );
     let small = if plot.is_labelled { 12 } else { 9 };
-    for v in x.ticks(if plot.is_labelled { 8 } else { 3 }) {
-        let at = x.place(v);
+    let ticks = x.ticks(if plot.is_labelled { 8 } else { 3 });
+    for (v, label) in ticks.iter().zip(tick_labels(&ticks, x.is_log)) {
+        let at = x.place(*v);
         let _ = write!(
             out,
             r#"<line x1="{at:.1}" y1="{top}" x2="{at:.1}" y2="{bottom}" stroke="var(--rule)"/><text x="{at:.1}" y="{:.1}" text-anchor="middle" font-size="{small}" style="fill:var(--muted)">{}</text>"#,
             bottom + f64::from(small) + 4.0,
-            number(v)
+            label
         );
     }
     let errors = if is_exact { Vec::new() } else { y.ticks(if plot.is_labelled { 8 } else { 4 }) };
@@ -325,7 +336,7 @@ pub fn lines(
 ) -> String {
     let (moves, places, is_geometric) = axis;
     let [width, height] = size;
-    let [left, top, right, bottom] = [62.0, 34.0, width - 230.0, height - 46.0];
+    let [left, top, right, bottom] = [80.0, 34.0, width - 230.0, height - 46.0];
     let (high, low) = (range(lines.iter().flat_map(|l| l.values.iter().copied())).1, 0.0);
     let Some((first, last)) = places.first().zip(places.last()) else { return String::new() };
     if lines.is_empty() {
@@ -340,13 +351,14 @@ pub fn lines(
         r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" aria-label="{0}"><text x="{left}" y="20" font-size="15" font-weight="600">{0}</text>"#,
         escaped(title)
     );
-    for v in x.ticks(9) {
-        let at = x.place(v);
+    let ticks = x.ticks(9);
+    for (v, label) in ticks.iter().zip(tick_labels(&ticks, x.is_log)) {
+        let at = x.place(*v);
         let _ = write!(
             out,
             r#"<line x1="{at:.1}" y1="{top}" x2="{at:.1}" y2="{bottom}" stroke="var(--rule)"/><text x="{at:.1}" y="{:.1}" text-anchor="middle" font-size="12" style="fill:var(--muted)">{}</text>"#,
             bottom + 16.0,
-            number(v)
+            label
         );
     }
     for v in y.ticks(6) {
@@ -468,7 +480,7 @@ mod tests {
             size: [700.0, 400.0],
             is_labelled: true,
         };
-        assert_eq!(svg(&plot).matches(">method ").count(), 6);
+        assert_eq!(svg(&plot).matches("font-weight=\"400\">method ").count(), 6);
     }
 
     #[test]

@@ -164,8 +164,8 @@ mod tests {
         assert!((lamp("near-0").y / lamp("near-0").length() - 0.5f32.sqrt()).abs() < 1e-5);
         assert!(lamp("near-0").x.abs() < 1e-6 && lamp("near-0").z > 0.0);
         assert!(lamp("near-110").x > 0.0 && lamp("near-150").z < lamp("near-110").z);
-        let far = shot("far-0").camera.position.z - MIDDLE_Z;
-        let zoom = shot("zoom-0").camera.position.z - MIDDLE_Z;
-        assert!((far / zoom - 132.0 / 28.0).abs() < 1e-4);
+        let z = |name: &str| shot(name).camera.position.z;
+        let steps = (z("far-0") - z("zoom-0")) / (z("near-0") - z("zoom-0"));
+        assert!((steps - (132.0 - 28.0) / (50.0 - 28.0)).abs() < 1e-4, "{steps}");
     }
 }

@@ -32,8 +32,12 @@ pub fn about(report: &StabilityReport) -> String {
 
 /// Residuals of each group in each sweep; the number behind a name is its largest.
 fn plots(report: &StabilityReport) -> Vec<String> {
-    let mut groups: Vec<&str> = report.rows.iter().map(|r| r.group.as_str()).collect();
-    groups.dedup();
+    let mut groups: Vec<&str> = Vec::new();
+    for row in &report.rows {
+        if !groups.contains(&row.group.as_str()) {
+            groups.push(&row.group);
+        }
+    }
     let mut all = Vec::new();
     for sweep in &report.sweeps {
         for group in &groups {

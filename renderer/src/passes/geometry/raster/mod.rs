@@ -32,8 +32,9 @@ use crate::scene::{MAX_HEADS, PosedHead};
 const SHADER: Module = module!("raster", "raster.wesl");
 const RESOLVE_SHADER: Module = module!("raster_resolve", "resolve.wesl");
 
-/// Large triangles of a head that the list holds; with more, each is drawn by one invocation (`raster_rest`).
-const LARGE_CAPACITY: u32 = 32768;
+/// Large triangles of a head that the list holds; with more, all triangles are looked at again (`raster_rest`).
+/// Close-ups have most: every triangle before a lamp that is fitted to what the camera sees.
+const LARGE_CAPACITY: u32 = 131_072;
 /// Workgroups that share the large triangles of a head.
 const LARGE_GROUPS: u32 = 1024;
 
@@ -158,7 +159,6 @@ impl Fill {
 impl ComputeRaster {
     /// The pipelines of a sight, for triangles without holes.
     pub(crate) fn new(gpu: &Gpu, sight: Sight) -> Self {
-        let large = 4 * (MAX_HEADS as u64) * (1 + 2 * u64::from(LARGE_CAPACITY));
         let narrow = sight == Sight::Camera { wide: false };
         Self {
             sight,
@@ -168,7 +168,7 @@ impl ComputeRaster {
             resolve: Kernel::new(gpu, sight.labels()[3], &resolve_program(sight), "raster_resolve"),
             pixels: gpu.storage_zeroed("keys of pixels", 0),
             nearest: gpu.storage_zeroed("ids of pixels", 0),
-            large: gpu.storage_zeroed("large triangles", large),
+            large: gpu.storage_zeroed("large triangles", 0),
         }
     }
 
@@ -177,8 +177,12 @@ impl ComputeRaster {
         if self.sight == (Sight::Camera { wide: true }) { 8 } else { 4 }
     }
 
-    /// Makes what frames of `pixels` pixels need, with or without holes.
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, pixels: u64, has_holes: bool) {
+    /// Makes what frames of `pixels` pixels and so many heads need, with or without holes.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, pixels: u64, heads: usize, has_holes: bool) {
+        let large = 4 * (MAX_HEADS as u64 + 2 * u64::from(LARGE_CAPACITY) * heads.max(1) as u64);
+        if self.large.size() != large {
+            self.large = gpu.storage_zeroed("large triangles", large);
+        }
         let bytes = pixels * self.bytes_per_pixel();
         // Keys are kept between frames, so what is much too large is given back.
         let fits = |buffer: &wgpu::Buffer, bytes: u64| {

@@ -154,7 +154,7 @@ fn seen(gpu: &Gpu, head: &Head, size: [u32; 2], rasteriser: Rasteriser) -> (Vec<
     view.size = size;
     let view = gpu.uniform("view", &view);
     let mut pass = Visibility::new(gpu, rasteriser);
-    pass.prepare(gpu, size, false);
+    pass.prepare(gpu, size, 1, false);
     // Twice: the keys of the first frame are gone in the second.
     let draw = || {
         let [ids, depth] = recorded(gpu, |r| pass.record(r, &view, &heads, size));
@@ -187,8 +187,8 @@ fn pixels_belong_to_the_triangles_of_exact_areas() {
     }
     let mut all: Vec<_> = all.into_iter().map(|triangles| (size, triangles)).collect();
     // More large triangles than the list holds.
-    let small = [64, 16];
-    all.push((small, scattered(small, LARGE_CAPACITY as usize + 100, 90 * 256, &mut random)));
+    let small = [16, 8];
+    all.push((small, scattered(small, LARGE_CAPACITY as usize + 20_000, 200 * 256, &mut random)));
     for (size, triangles) in &all {
         let (size, expected) = (*size, expected(*size, triangles));
         for rasteriser in rasterisers(gpu) {

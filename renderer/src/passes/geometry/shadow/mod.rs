@@ -50,9 +50,9 @@ impl Shadow {
     }
 
     /// Makes what frames with a number of lights need.
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, lights: usize, side: u32, has_holes: bool) {
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, lights: usize, side: u32, heads: usize, has_holes: bool) {
         if let Self::Compute(raster) = self {
-            raster.prepare(gpu, lights.max(1) as u64 * u64::from(side) * u64::from(side), has_holes);
+            raster.prepare(gpu, lights.max(1) as u64 * u64::from(side) * u64::from(side), heads, has_holes);
         }
     }
 

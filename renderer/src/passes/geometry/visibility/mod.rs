@@ -60,9 +60,9 @@ impl Visibility {
     }
 
     /// Makes what frames of a size need.
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, [width, height]: [u32; 2], has_holes: bool) {
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, [width, height]: [u32; 2], heads: usize, has_holes: bool) {
         if let Self::Compute(raster) = self {
-            raster.prepare(gpu, u64::from(width) * u64::from(height), has_holes);
+            raster.prepare(gpu, u64::from(width) * u64::from(height), heads, has_holes);
         }
     }
 
