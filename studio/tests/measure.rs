@@ -240,6 +240,13 @@ fn a_chart_has_a_row_a_choice_its_pictures_and_its_page() {
     assert!(page.contains("ear/scatter_separable-5.png") && !page.contains("http://localhost"));
     let lines = std::fs::read_to_string(Path::new(&out).join("chart.csv")).expect("a table");
     assert_eq!(lines.lines().count(), 1 + 5, "{lines}");
+    // The page can be drawn again without a device.
+    let again = folder.path("again");
+    let json = Path::new(&out).join("chart.json").to_string_lossy().into_owned();
+    assert!(folder.run(&["chart", "--from", &json, "-o", &again]).status.success());
+    let same = std::fs::read_to_string(Path::new(&again).join("index.html")).expect("a page");
+    assert!(same == page, "the page of the same report differs");
+    folder.refused(&["chart", "--from", &scene, "-o", &again], &["ear.json", "chart.json"]);
     folder.refused(&[&small[..], &["--batches", "0"]].concat(), &["reference-surface:0", "1 to 4096"]);
     folder.refused(&[&small[..], &["--exposure", "nan"]].concat(), &["exposure"]);
     folder.refused(&[&small[..], &["--adapter", "abacus"]].concat(), &["abacus"]);

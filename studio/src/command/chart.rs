@@ -1,16 +1,17 @@
 //! `rubor chart`: cost and error of every choice of a frame, in a suite of scenes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rubor::auto::calibration::Times;
 use rubor::auto::{self, Auto, Bound, Calibration, experiment};
 use rubor::measure::chart::{self, Effort, Measure, Options, Suite, Timing, page, plot::number};
 use rubor::measure::stability;
 use rubor::report::{ChartError, ChartGroup, ChartReport, StabilityReport};
-use rubor::{Outcome, Report, Studio, Watch, inputs, output};
+use rubor::{Failure, Outcome, Report, Studio, Watch, inputs, output};
 use rubor_renderer::settings::{ScatterMethod, Settings};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
+use rubor_rig::json;
 
 use super::console::Progress;
 use super::settings_flags::{Choices, Purpose, SettingsFlags};
@@ -47,6 +48,9 @@ pub(crate) struct Arguments {
     /// visible differences; with --sequence the diffuse light too (EXR)
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Draw the page of a chart that was measured before: its chart.json
+    #[arg(long, value_name = "FILE", requires = "output", conflicts_with_all = ["sequence", "head", "stability", "calibrate", "auto"])]
+    from: Option<PathBuf>,
     /// In place of time and error: what methods do while one quantity moves in small steps (stability.svg, .csv, .json)
     #[arg(long, conflicts_with = "sequence")]
     stability: bool,
@@ -82,6 +86,9 @@ const SIZE: &str = "384x384";
 const QUICK_SIZE: [u32; 2] = [128, 128];
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    if let (Some(path), Some(folder)) = (&arguments.from, &arguments.output) {
+        return draw_again(path, folder);
+    }
     let Choices { mut base, listed, held } = arguments.settings.choices()?;
     let loaded = inputs::head(arguments.head.as_deref())?;
     console::notes(&loaded.notes);
@@ -97,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         batches: arguments.batches.unwrap_or(batches),
         samples: arguments.samples.unwrap_or(samples),
     };
-    ScatterMethod::ReferenceSurface(effort.batches).validate().map_err(rubor::Failure::input)?;
+    ScatterMethod::ReferenceSurface(effort.batches).validate().map_err(Failure::input)?;
     if arguments.calibrate {
         return calibrate(arguments, &mut studio, &loaded.head, &rig, &base, is_quick);
     }
@@ -154,6 +161,22 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     Ok(())
 }
 
+/// The page of a report.
+fn draw_again(path: &Path, folder: &Path) -> Outcome {
+    let text = json::read_text(path)?;
+    match serde_json::from_str(&text) {
+        Ok(Report::Chart(report)) => {
+            output::folder(folder)?;
+            say!("{}", page::write(folder, &report)?.display());
+            Ok(())
+        }
+        Ok(_) => {
+            Err(Failure::input(format!("{}: found another report, expected that of a chart", path.display())))
+        }
+        Err(e) => Err(Failure::input(format!("{}: {e}, expected chart.json of a chart", path.display()))),
+    }
+}
+
 /// Seed of the random shots.
 const SEED: u64 = 1;
 
@@ -192,7 +215,7 @@ fn calibrate(
     let outline = auto::Outline::of(head);
     let features: Vec<_> = scenes.iter().map(|s| outline.features(&s.shot, base.output.size)).collect();
     let calibration = Calibration::of(&report, &features, &times)
-        .ok_or_else(|| rubor::Failure::job("the shots do not suffice for estimates").hint("more --shots"))?;
+        .ok_or_else(|| Failure::job("the shots do not suffice for estimates").hint("more --shots"))?;
     let kept = calibration.keep()?;
     if let Some(folder) = &arguments.output {
         output::folder(folder)?;

@@ -1,4 +1,4 @@
-//! The files of a chart: `chart.json`, `chart.csv`, `chart.svg` and `index.html`.
+//! The files of a chart: `chart.json`, `chart.csv`, `chart.svg` with all plots, `chart-GROUP.svg` with one, and `index.html`.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -25,6 +25,10 @@ pub fn write(folder: &Path, report: &ChartReport) -> Outcome<PathBuf> {
     let plots: Vec<String> =
         report.groups.iter().enumerate().map(|(g, group)| overall_plot(report, g, group)).collect();
     output::write(&folder.join("chart.svg"), plot::file(&plots, LARGE, &about(report)).as_bytes())?;
+    for (group, plot) in report.groups.iter().zip(&plots).filter(|(_, plot)| !plot.is_empty()) {
+        let alone = plot::file(std::slice::from_ref(plot), LARGE, &about(report));
+        output::write(&folder.join(format!("chart-{}.svg", group.flag)), alone.as_bytes())?;
+    }
     let page = folder.join("index.html");
     output::write(&page, html(report, &plots)?.as_bytes())?;
     Ok(page)
