@@ -181,6 +181,19 @@ fn textured_parts_keep_their_look() {
 }
 
 #[test]
+fn clear_shells_before_eyes_are_not_eyes() {
+    let plain = |alpha: f32, mode: &str| {
+        let color = [1.0, 1.0, 1.0, alpha];
+        json!({"name": "lambert1", "alphaMode": mode, "pbrMetallicRoughness": {"baseColorFactor": color}})
+    };
+    let materials = json!([plain(1.0, "OPAQUE"), plain(0.1, "BLEND"), plain(0.9, "BLEND")]);
+    let parts = [("eyeLeft", Some(0)), ("eyeLeftOuter", Some(1)), ("eyeRight", Some(2))];
+    let imported = import(&document(&parts, materials));
+    assert_eq!(kinds(&imported), [Material::Eye, Material::Other, Material::Eye]);
+    says(&imported, "clear shells of eyes", "lambert1");
+}
+
+#[test]
 fn textured_skin_keeps_its_colour_in_own_files() {
     let textured = json!([{
         "name": "Wolf3D_Skin", "alphaMode": "MASK",
