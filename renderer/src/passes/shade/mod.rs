@@ -25,7 +25,8 @@
 //! than 1 where the albedo is at most 1 - rho(normal).
 //!
 //! Specular occlusion: the share of the lobe inside the cone of ambient visibility, which leans towards the viewer
-//! (`specular_visibility`; `docs/occlusion.md`); for the environment and for lamps without a shadow map.
+//! (`specular_visibility`; `docs/occlusion.md`); for the environment and for lamps without a shadow map, which light base
+//! colours as glTF says.
 //!
 //! Highlights of skin may have two lobes ([`SpecularMethod`]): D is their weighted mean, so the table is the same mean.
 //!
