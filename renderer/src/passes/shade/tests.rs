@@ -208,6 +208,13 @@ fn light_on_skin_of_its_own_colour_is_that_of_a_base_colour() {
     let Some(mut renderer) = renderer() else { return };
     let camera = Camera { position: 0.5 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 };
     let size = 45;
+    let directions = [Vec3::new(0.1, -0.2, -1.0), Vec3::new(-0.8, -0.5, -0.6), Vec3::new(0.9, 0.3, -0.4)];
+    let lamps = directions.map(|direction| Light {
+        kind: LightKind::Directional { direction },
+        color_linear: Vec3::new(2.0, 1.0, 0.5),
+        radius: 0.0,
+        casts_shadow: false,
+    });
     // The map keeps the colour in sRGB codes.
     let base = srgb_decode(srgb_encode(0.3).mul_add(255.0, 0.5).floor() / 255.0);
     for (alpha, specular) in
@@ -235,19 +242,15 @@ fn light_on_skin_of_its_own_colour_is_that_of_a_base_colour() {
             metallic: 0.0,
             roughness: f64::from(alpha).sqrt(),
         };
-        for direction in [Vec3::new(0.1, -0.2, -1.0), Vec3::new(-0.8, -0.5, -0.6), Vec3::new(0.9, 0.3, -0.4)]
-        {
-            let kind = LightKind::Directional { direction };
-            let lamp =
-                Light { kind, color_linear: Vec3::new(2.0, 1.0, 0.5), radius: 0.0, casts_shadow: false };
-            let lamps = [lamp];
-            scene.lights = &lamps;
+        for lamp in &lamps {
+            scene.lights = std::slice::from_ref(lamp);
             render(&mut renderer, &scene, &settings).expect("it draws");
             let (compared, largest) =
-                largest_error(&renderer, &head, &camera, size, &lamp, |n, l, v| expected.radiance(n, l, v));
+                largest_error(&renderer, &head, &camera, size, lamp, |n, l, v| expected.radiance(n, l, v));
             assert!(
                 compared > 200 && largest < 0.005,
-                "{alpha} {direction}: {compared} pixels, error up to {largest}"
+                "{alpha} {:?}: {compared} pixels, error up to {largest}",
+                lamp.kind
             );
         }
         // Of an even sky: what is reflected, and the colour of the rest. The middle of the picture sees the dome from in front.
