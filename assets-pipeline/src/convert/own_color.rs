@@ -46,6 +46,9 @@ const SLACK: f32 = 0.01;
 const EVEN_SIDE: u32 = 64;
 /// Texels of the look-up along each axis.
 const LOOKUP_SIZE: u32 = 128;
+/// Largest slope of relief, 76 degrees: steeper texels of normal maps are noise, and the range that slopes are stored over has to
+/// hold them.
+const STEEPEST: f32 = 4.0;
 /// Least alpha of GGX: of the lowest roughness for which three.js draws the highlight of a lamp, 0.045.
 const LEAST_ROUGHNESS: f32 = 0.002;
 /// Share of texels outside of the gamut from which on a note says so.
@@ -354,7 +357,7 @@ impl Atlas {
                 continue;
             };
             let mut slopes = slopes_from_normals(&value_map(image_of(head, texture)), GreenAxis::OpenGl)?.map;
-            slopes.values.iter_mut().for_each(|s| *s *= scale);
+            slopes.values.iter_mut().for_each(|s| *s = (scale * *s).clamp(-STEEPEST, STEEPEST));
             tiles.push(resized(slopes, w, h));
         }
         Ok(Some(self.assemble(&tiles, &[0.0; 2])))

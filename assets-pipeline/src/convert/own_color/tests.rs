@@ -253,6 +253,16 @@ fn normal_map_and_roughness_come_along_and_the_rest_is_said() {
 }
 
 #[test]
+fn stray_texels_of_a_normal_map_are_no_cliffs() {
+    // The first texel lies on its side.
+    let bumps = picture(4, 4, |i| if i == 0 { [255, 128, 128, 255] } else { [128, 128, 255, 255] });
+    let material = AuthoredMaterial { normal_texture: texture(1), ..matte(0) };
+    let (head, _) = adopted(one_sheet(material, vec![face(16, 16), bumps]));
+    let slopes = head.maps.slopes.unwrap();
+    assert_eq!(slopes.values[0], STEEPEST);
+}
+
+#[test]
 fn colours_of_vertices_are_factors() {
     let mut head = one_sheet(matte(0), vec![picture(16, 16, |_| [255; 4])]);
     head.authored.colors_linear =
