@@ -4,11 +4,12 @@ use std::path::Path;
 
 use glam::Vec2;
 use rubor_assets::convert::own_color;
-use rubor_assets::export::gltf::{Options, to_bytes};
+use rubor_assets::export::gltf::{MapEncodings, Options, to_bytes};
 use rubor_assets::import::gltf::{ImportedHead, from_bytes};
 use rubor_rig::authored::{AlphaMode, Wrap};
 use rubor_rig::color::srgb_encode;
 use rubor_rig::head::Material;
+use rubor_rig::map::Map;
 use serde_json::{Value, json};
 
 fn data_uri(kind: &str, bytes: &[u8]) -> String {
@@ -181,6 +182,19 @@ fn textured_parts_keep_their_look() {
 }
 
 #[test]
+fn clear_shells_before_eyes_are_not_eyes() {
+    let plain = |alpha: f32, mode: &str| {
+        let color = [1.0, 1.0, 1.0, alpha];
+        json!({"name": "lambert1", "alphaMode": mode, "pbrMetallicRoughness": {"baseColorFactor": color}})
+    };
+    let materials = json!([plain(1.0, "OPAQUE"), plain(0.1, "BLEND"), plain(0.9, "BLEND")]);
+    let parts = [("eyeLeft", Some(0)), ("eyeLeftOuter", Some(1)), ("eyeRight", Some(2))];
+    let imported = import(&document(&parts, materials));
+    assert_eq!(kinds(&imported), [Material::Eye, Material::Other, Material::Eye]);
+    says(&imported, "clear shells of eyes", "lambert1");
+}
+
+#[test]
 fn textured_skin_keeps_its_colour_in_own_files() {
     let textured = json!([{
         "name": "Wolf3D_Skin", "alphaMode": "MASK",
@@ -211,6 +225,22 @@ fn textured_skin_keeps_its_colour_in_own_files() {
     let text = serde_json::to_value(extension).unwrap();
     assert_eq!(text["RUBOR_facial_appearance"]["maps"]["albedo"]["image"], json!(shown));
     assert_eq!(to_bytes(&own.head, &Options::default()).unwrap(), bytes);
+}
+
+#[test]
+fn level_skin_stays_level_beside_steep_relief() {
+    let textured = json!([{"name": "skin", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
+    let mut head = import(&document(&[("head", Some(0))], textured)).head;
+    own_color::adopt(&mut head, &own_color::Options::default()).unwrap();
+    let slopes = vec![-18.3, 0.0, 0.0, 0.0, 3.6, 19.9, 0.0, -16.6];
+    head.maps.slopes = Some(Map { width: 4, height: 1, channels: 2, values: slopes.clone() });
+    for maps in [MapEncodings::default(), MapEncodings::small()] {
+        let bytes = to_bytes(&head, &Options { maps, ..Options::default() }).unwrap();
+        let read = from_bytes(&bytes, Path::new("own.glb")).unwrap().head.maps.slopes.unwrap();
+        let off =
+            read.values.iter().zip(&slopes).map(|(a, b): (&f32, &f32)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < 5e-4, "{off}: {:?}", read.values);
+    }
 }
 
 #[test]

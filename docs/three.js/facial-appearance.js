@@ -38,7 +38,7 @@ export class FacialAppearance {
     });
     const images = new Images(gltf);
     if (this.maps.melanin && this.maps.hemoglobin && data.skinLookUp) await this.loadColor(images, data.skinLookUp);
-    if (this.maps.slopes) await this.loadRelief(images);
+    if (this.maps.slopes || this.maps.wrinkleSlopes?.length) await this.loadRelief(images);
     await this.loadAnimation(gltf, data.skinAnimation);
     images.dispose();
     for (const mesh of this.skins) {
@@ -85,9 +85,11 @@ export class FacialAppearance {
 
   async loadRelief(images) {
     const { maps } = this;
-    const slopes = await images.map(maps.slopes);
-    this.slopesTexture = texture(slopes.pairs(), slopes.width, slopes.height, THREE.RGFormat, THREE.UnsignedByteType, true);
-    this.slopesCode = slopes.code();
+    // Skin that its author made smooth has wrinkles alone.
+    const slopes = maps.slopes && (await images.map(maps.slopes));
+    this.slopesTexture = texture(slopes?.pairs() ?? new Uint8Array(2), slopes?.width ?? 1, slopes?.height ?? 1,
+      THREE.RGFormat, THREE.UnsignedByteType, true);
+    this.slopesCode = slopes?.code() ?? new THREE.Vector4();
     const wrinkles = [];
     for (const entry of (maps.wrinkleSlopes ?? []).slice(0, 4)) wrinkles.push(await images.map(entry));
     // One size for all layers: heads of rubor have it; others lose what is not like the first.
@@ -120,7 +122,11 @@ export class FacialAppearance {
   material(from) {
     const material = from.clone();
     material.vertexColors = false;
-    if (this.skinTexture) material.map = null;
+    // With a normal map three.js makes the tangent frame `tbn`.
+    if (this.slopesTexture) material.normalMap ??= texture(new Uint8Array([128, 128, 255, 255]), 1, 1, THREE.RGBAFormat, THREE.UnsignedByteType, false);
+    // Skin with a colour by itself shows it: its base colour, which blood moves.
+    const own = this.skinTexture && this.maps.albedo && material.map;
+    if (this.skinTexture && !own) material.map = null;
     const uniforms = {
       faSkin: { value: this.skinTexture }, faBlood: { value: this.bloodTexture }, faLookUp: { value: this.lookUpTexture },
       faSlopes: { value: this.slopesTexture }, faSlopesCode: { value: this.slopesCode },
@@ -135,13 +141,12 @@ export class FacialAppearance {
         .replace("#include <common>", "#include <common>\nvarying vec2 faUv;")
         .replace("#include <uv_vertex>", "#include <uv_vertex>\nfaUv = uv;");
       let fragment = shader.fragmentShader.replace("#include <common>", `#include <common>\n${DECLARATIONS}`);
-      if (this.skinTexture) fragment = fragment.replace("#include <map_fragment>", COLOR);
-      // The normal map of the file stays bound: with it three.js makes the tangent frame `tbn`.
-      if (this.slopesTexture && material.normalMap)
+      if (this.skinTexture) fragment = fragment.replace("#include <map_fragment>", COLOR + (own ? OWN_COLOR : LOOKED_UP_COLOR));
+      if (this.slopesTexture)
         fragment = fragment.replace("#include <normal_fragment_maps>", relief(this.wrinkleCount));
       shader.fragmentShader = fragment;
     };
-    material.customProgramCacheKey = () => `${NAME} ${!!this.skinTexture} ${!!this.slopesTexture} ${this.wrinkleCount}`;
+    material.customProgramCacheKey = () => `${NAME} ${!!this.skinTexture} ${!!own} ${!!this.slopesTexture} ${this.wrinkleCount}`;
     return material;
   }
 
@@ -316,7 +321,15 @@ const COLOR = /* glsl */ `
   vec2 faSize = vec2(textureSize(faLookUp, 0));
   vec3 faColor = textureLod(faLookUp, (faAddress * (faSize - 1.0) + 0.5) / faSize, 0.0).rgb;
   float faHidden = 0.97 * smoothstep(0.0, 0.85, faTexel.a);
+`;
+const LOOKED_UP_COLOR = /* glsl */ `
   diffuseColor.rgb = mix(faColor, faHair, faHidden) * (1.0 - 0.3 * faHidden);
+`;
+const OWN_COLOR = /* glsl */ `
+  #include <map_fragment>
+  vec3 faRest = textureLod(faLookUp, (faTexel.rg * (faSize - 1.0) + 0.5) / faSize, 0.0).rgb;
+  diffuseColor.rgb = min(diffuseColor.rgb * clamp((faColor + 0.002) / (faRest + 0.002), 0.25, 4.0), 1.0);
+  diffuseColor.rgb = mix(diffuseColor.rgb, faHair, faHidden) * (1.0 - 0.3 * faHidden);
 `;
 
 const relief = (wrinkles) => /* glsl */ `

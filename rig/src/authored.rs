@@ -238,6 +238,11 @@ impl AuthoredMaterial {
         self.alpha == AlphaMode::Blend || self.transmission > 0.0
     }
 
+    /// Whether more of what is behind it shows than of itself, wherever a texture does not say otherwise: a cornea, a lens.
+    pub fn is_clear(&self) -> bool {
+        self.transmission > 0.5 || (self.alpha == AlphaMode::Blend && self.base_color[3] < 0.5)
+    }
+
     /// Reflectance head on of what is no metal, without specular factors.
     pub fn dielectric_f0(&self) -> f32 {
         ((self.ior - 1.0) / (self.ior + 1.0)).powi(2)
@@ -438,9 +443,15 @@ mod tests {
     #[test]
     fn glass_is_see_through_and_reflects_as_its_index_says() {
         let glass = AuthoredMaterial { transmission: 1.0, ior: 1.5, ..AuthoredMaterial::default() };
-        assert!(glass.is_see_through() && !AuthoredMaterial::default().is_see_through());
+        assert!(glass.is_clear() && glass.is_see_through() && !AuthoredMaterial::default().is_see_through());
         assert!((glass.dielectric_f0() - 0.04).abs() < 1e-7);
         assert_eq!(AuthoredMaterial { ior: 0.0, ..glass }.dielectric_f0(), 1.0);
+        let film = |alpha| AuthoredMaterial {
+            base_color: [1.0, 1.0, 1.0, 0.1],
+            alpha,
+            ..AuthoredMaterial::default()
+        };
+        assert!(film(AlphaMode::Blend).is_clear() && !film(AlphaMode::Opaque).is_clear());
     }
 
     #[test]

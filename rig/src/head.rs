@@ -16,6 +16,11 @@ use crate::map::Map;
 /// Millimetres in a metre: the one conversion between head space and scattering lengths.
 pub const MM_PER_METRE: f32 = 1000.0;
 
+/// Reflectance of skin seen head on, with the index 1.4: that of a specular intensity of 1 ([`SkinMaps::specular`]).
+pub const SKIN_F0: f32 = 0.028;
+/// The same of glTF's materials, with the index 1.5, and so of skin that has a colour by itself.
+pub const BASE_COLOR_F0: f32 = 0.04;
+
 /// A face with everything that does not change while it acts.
 #[derive(Clone, Debug, Default)]
 pub struct Head {
@@ -191,7 +196,8 @@ pub struct SkinMaps {
     pub wrinkle_slopes: Vec<Map>,
     /// Areas whose wrinkles appear together.
     pub zones: Vec<WrinkleZone>,
-    /// Specular: channel 0 intensity factor 0 to 1, channel 1 Beckmann roughness m 0 to 1.
+    /// Specular: channel 0 reflectance head on over [`SKIN_F0`], 0 to 1, or to `BASE_COLOR_F0 / SKIN_F0` of skin with a colour by
+    /// itself; channel 1 Beckmann roughness m, of the latter alpha of GGX, which is the same width of slopes, 0 to 1.
     pub specular: Option<Map>,
     /// Subsurface scattering strength 0 to 1, 1 channel (0 at brows, stubble and nails).
     pub scattering: Option<Map>,

@@ -9,6 +9,7 @@
 #
 # CHROMIUM: the browser. BPY_PYTHON, USD_PYTHON: pythons with the packages; made in FOLDER where they are not set.
 # HEADS: files of other programs (.glb) that import and three.js should show alike.
+# BUILT: a folder with rubor and examples/ (target/debug); without it a release build is made.
 # RUBOR_ADAPTER: the adapter that draws the pictures of rubor.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -36,10 +37,13 @@ if [ -n "$asked" ] && [ -n "$no_web" ] && wanted web; then
   exit $status
 fi
 
-cargo build --release --locked -p rubor -p rubor-tests --bins --examples
-target=$(cd "${CARGO_TARGET_DIR:-target}" && pwd)
-rubor=$target/release/rubor
-examples=$target/release/examples
+if [ -z "${BUILT:-}" ]; then
+  cargo build --release --locked -p rubor -p rubor-tests --bins --examples
+  BUILT=${CARGO_TARGET_DIR:-target}/release
+fi
+BUILT=$(cd "$BUILT" && pwd)
+rubor=$BUILT/rubor
+examples=$BUILT/examples
 
 for name in mixed combined; do
   "$rubor" export --rig "$here/$name.rig.json" --sequence "$here/$name.json" -o "$out/$name.glb"

@@ -6,7 +6,7 @@
 //!                        5 to 9 a ninth each
 //!   base colour ------> albedo map, texel by texel --chromophores--> melanin, hemoglobin
 //!   normal map -------> slopes
-//!   roughness --------> specular map: m = roughness^2
+//!   roughness --------> specular map: alpha = roughness^2
 //! ```
 //!
 //! The neutral skin then shows the author's colour, and blood, wrinkles and scattering are added to it. What has no place in
@@ -23,7 +23,7 @@ use rubor_rig::authored::{
     AlphaMode, AuthoredImage, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap,
 };
 use rubor_rig::color::srgb_decode;
-use rubor_rig::head::{Head, Material, Provenance, ProvenanceKind};
+use rubor_rig::head::{BASE_COLOR_F0, Head, Material, Provenance, ProvenanceKind, SKIN_F0};
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, resize_area};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinModel};
@@ -46,8 +46,11 @@ const SLACK: f32 = 0.01;
 const EVEN_SIDE: u32 = 64;
 /// Texels of the look-up along each axis.
 const LOOKUP_SIZE: u32 = 128;
-/// Reflectance of glTF's dielectrics over that of skin, both seen head on; intensities end at 1.
-const SPECULAR_OVER_SKIN: f32 = 0.04 / 0.028;
+/// Largest slope of relief, 76 degrees: steeper texels of normal maps are noise, and the range that slopes are stored over has to
+/// hold them.
+const STEEPEST: f32 = 4.0;
+/// Least alpha of GGX: of the lowest roughness for which three.js draws the highlight of a lamp, 0.045.
+const LEAST_ROUGHNESS: f32 = 0.002;
 /// Share of texels outside of the gamut from which on a note says so.
 const SAID_SHARE: f64 = 0.02;
 
@@ -241,6 +244,12 @@ fn say_what_is_left_out(head: &Head, sheets: &[Sheet], notes: &mut Notes) {
         if material.clearcoat > 0.0 {
             notes.add("skin has no coat: the clear coat of its material is left out", name);
         }
+        if material.dielectric_f0() > 1.01 * BASE_COLOR_F0 {
+            notes.add("skin reflects no more than an index of refraction of 1.5 says", name);
+        }
+        if material.specular_color != [1.0; 3] || material.specular_color_texture.is_some() {
+            notes.add("reflections of skin are white: the specular colour of its material is left out", name);
+        }
         if material.transmission > 0.0 {
             notes.add("skin is no glass: the transmission of its material is left out", name);
         }
@@ -348,35 +357,42 @@ impl Atlas {
                 continue;
             };
             let mut slopes = slopes_from_normals(&value_map(image_of(head, texture)), GreenAxis::OpenGl)?.map;
-            slopes.values.iter_mut().for_each(|s| *s *= scale);
+            slopes.values.iter_mut().for_each(|s| *s = (scale * *s).clamp(-STEEPEST, STEEPEST));
             tiles.push(resized(slopes, w, h));
         }
         Ok(Some(self.assemble(&tiles, &[0.0; 2])))
     }
 
-    /// Specular intensity, and Beckmann roughness: the alpha of GGX has the same meaning, the width of slopes.
+    /// Specular intensity, and alpha of GGX.
     fn specular(&self, head: &Head, sheets: &[Sheet]) -> Map {
-        let texture = |sheet: &Sheet| {
+        let texture = |sheet: &Sheet, which: fn(&AuthoredMaterial) -> Option<AuthoredTexture>| {
             let material = sheet.material(head);
-            let (base, gloss) = (material.base_color_texture?, material.metallic_roughness_texture?);
-            is_placed_alike(&base, &gloss).then_some(gloss)
+            let (base, found) = (material.base_color_texture?, which(material)?);
+            is_placed_alike(&base, &found).then_some(found)
         };
-        let value = |sheet: &Sheet, green: f32| {
+        let gloss = |sheet: &Sheet| texture(sheet, |m| m.metallic_roughness_texture);
+        let strength = |sheet: &Sheet| texture(sheet, |m| m.specular_texture);
+        let value = |sheet: &Sheet, strength: f32, green: f32| {
             let material = sheet.material(head);
-            let intensity = (SPECULAR_OVER_SKIN * material.specular).min(1.0);
-            [intensity, (material.roughness * green).powi(2).clamp(0.02, 0.8)]
+            let f0 = (material.dielectric_f0() * material.specular * strength).min(BASE_COLOR_F0);
+            [f0 / SKIN_F0, (material.roughness * green).powi(2).clamp(LEAST_ROUGHNESS, 1.0)]
         };
-        let sizes = sheets.iter().filter_map(texture).map(|t| image_of(head, &t));
-        let sizes: Vec<_> = sizes.map(|i| (i.width, i.height)).collect();
-        let first = value(&sheets[0], 1.0);
-        if sizes.is_empty() && sheets.iter().all(|s| value(s, 1.0) == first) {
+        let pictures =
+            sheets.iter().flat_map(|s| [gloss(s), strength(s)]).flatten().map(|t| image_of(head, &t));
+        let sizes: Vec<_> = pictures.map(|i| (i.width, i.height)).collect();
+        let first = value(&sheets[0], 1.0, 1.0);
+        if sizes.is_empty() && sheets.iter().all(|s| value(s, 1.0, 1.0) == first) {
             return Map::filled(1, 1, &first);
         }
         let (w, h) = self.tile_size(sizes.into_iter().chain([(EVEN_SIDE, EVEN_SIDE)]));
         let tile = |sheet: &Sheet| {
-            let Some(texture) = texture(sheet) else { return Map::filled(w, h, &value(sheet, 1.0)) };
-            let gloss = resized(value_map(image_of(head, &texture)), w, h);
-            let values = gloss.values.chunks_exact(3).flat_map(|c| value(sheet, c[1])).collect();
+            let channel = |texture: Option<AuthoredTexture>, channel: usize| {
+                texture.map(|t| resized(channel_map(image_of(head, &t), channel), w, h).values)
+            };
+            let (alpha, green) = (channel(strength(sheet), 3), channel(gloss(sheet), 1));
+            let at = |values: &Option<Vec<f32>>, i: usize| values.as_ref().map_or(1.0, |v| v[i]);
+            let values =
+                (0..(w * h) as usize).flat_map(|i| value(sheet, at(&alpha, i), at(&green, i))).collect();
             Map { width: w, height: h, channels: 2, values }
         };
         self.assemble(&sheets.iter().map(tile).collect::<Vec<_>>(), &first)
@@ -561,6 +577,12 @@ fn is_placed_alike(a: &AuthoredTexture, b: &AuthoredTexture) -> bool {
 fn color_map(image: &AuthoredImage) -> Map {
     let decode: Vec<f32> = (0..=255u8).map(|byte| srgb_decode(f32::from(byte) / 255.0)).collect();
     map_of(image, &decode)
+}
+
+/// Codes 0 to 1 of one channel of a picture.
+fn channel_map(image: &AuthoredImage, channel: usize) -> Map {
+    let values = image.rgba.chunks_exact(4).map(|t| f32::from(t[channel]) / 255.0).collect();
+    Map { width: image.width, height: image.height, channels: 1, values }
 }
 
 /// Codes 0 to 1 of a picture.

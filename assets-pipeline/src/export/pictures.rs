@@ -4,7 +4,7 @@ use glam::Vec3;
 use image::ExtendedColorType;
 use rayon::prelude::*;
 use rubor_rig::face_state::FaceState;
-use rubor_rig::head::{Head, Material};
+use rubor_rig::head::{BASE_COLOR_F0, Head, Material, SKIN_F0};
 use rubor_rig::map::Map;
 
 use super::eye_mouth;
@@ -18,6 +18,8 @@ const GLOSS_SIZE: u32 = 1024;
 
 /// Of skin (Jimenez 2012 section 7.6: 1.4).
 const SKIN_IOR: f32 = 1.4;
+/// Of glTF's materials, and so of skin with a colour by itself.
+const BASE_COLOR_IOR: f32 = 1.5;
 
 /// 8-bit texels.
 pub(super) struct Picture {
@@ -94,6 +96,7 @@ pub(super) fn appearance(head: &Head, material: Material, textured: bool) -> Loo
     let solid = |[r, g, b]: [f32; 3]| [r, g, b, 1.0];
     let hair = head.maps.hair_color_linear;
     let (color_linear, roughness, ior, specular) = match material {
+        Material::Skin if textured && head.maps.albedo.is_some() => (white, 0.5, BASE_COLOR_IOR, 1.0),
         Material::Skin if textured => (white, 0.5, SKIN_IOR, 1.0),
         Material::Skin => (solid([0.60, 0.36, 0.27]), 0.57, SKIN_IOR, 0.6),
         Material::Mucosa => (solid([0.36, 0.105, 0.095]), 0.49, SKIN_IOR, 0.8),
@@ -134,11 +137,12 @@ fn gloss(head: &Head, size: u32) -> Option<Picture> {
 /// Strength of the skin's reflection, without what short hair hides.
 fn specular(head: &Head, size: u32) -> Option<Picture> {
     let map = head.maps.specular.as_ref().filter(|_| size > 0)?;
+    let over = if head.maps.albedo.is_some() { SKIN_F0 / BASE_COLOR_F0 } else { 1.0 };
     let texel = |i: u32| {
         let (u, v) = ((i % size) as f32 + 0.5, (i / size) as f32 + 0.5);
         let (u, v) = (u / size as f32, v / size as f32);
         let hair = head.maps.hair.as_ref().map_or(0.0, |h| hidden_by_hair(h.sample(u, v, 0)));
-        [255, 255, 255, byte(map.sample(u, v, 0) * (1.0 - hair))]
+        [255, 255, 255, byte(over * map.sample(u, v, 0) * (1.0 - hair))]
     };
     let texels = (0..size * size).into_par_iter().flat_map_iter(texel).collect();
     Some(Picture { texels, size: (size, size), color: ExtendedColorType::Rgba8 })

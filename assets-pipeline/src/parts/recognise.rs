@@ -5,6 +5,7 @@
 //! before a lid. Textured parts keep the look of their author and need no name.
 
 use glam::Vec3;
+use rubor_rig::authored::AuthoredMaterial;
 use rubor_rig::head::{Head, Material};
 use rubor_rig::landmarks::paired;
 
@@ -17,8 +18,8 @@ use crate::notes::{Note, Notes};
 /// Points of the skin of a face lie within this distance of its landmarks, mm: the edge of a coarse mesh.
 const FACE_REACH_MM: f32 = 12.0;
 
-/// Names parts, or pieces of parts, of a head whose face was found. Parts that a name tells, that have a texture or that
-/// `is_given` says are left alone.
+/// Names parts, or pieces of parts, of a head whose face was found. Parts that a name tells, that have a texture, that
+/// are seen through or that `is_given` says are left alone.
 pub fn recognise(head: &mut Head, fit: &Fit, is_given: impl Fn(&str) -> bool) -> Vec<Note> {
     let mut notes = Notes::default();
     if fit.confidence < TRUSTED {
@@ -30,7 +31,8 @@ pub fn recognise(head: &mut Head, fit: &Fit, is_given: impl Fn(&str) -> bool) ->
         let is_unknown = matches!(of.material, Material::Skin | Material::Other)
             && by_name(&of.name).is_none_or(|m| m == Material::Skin)
             && !is_given(&of.name)
-            && !is_textured(head, part);
+            && !is_textured(head, part)
+            && !is_clear(head, part);
         let pieces = if is_unknown { pieces(head, part, fit, &mut notes) } else { Vec::new() };
         let count = pieces.len();
         if count > 0 {
@@ -41,15 +43,23 @@ pub fn recognise(head: &mut Head, fit: &Fit, is_given: impl Fn(&str) -> bool) ->
     notes.into_vec()
 }
 
+fn material(head: &Head, part: usize) -> Option<&AuthoredMaterial> {
+    let material = head.authored.of_parts.get(part).copied().flatten()?;
+    Some(&head.authored.materials[material as usize])
+}
+
 fn is_textured(head: &Head, part: usize) -> bool {
-    let material = head.authored.of_parts.get(part).copied().flatten();
-    material.is_some_and(|m| head.authored.materials[m as usize].base_color_texture.is_some())
+    material(head, part).is_some_and(|m| m.base_color_texture.is_some())
+}
+
+/// Corneas and other shells are seen through.
+fn is_clear(head: &Head, part: usize) -> bool {
+    material(head, part).is_some_and(AuthoredMaterial::is_clear)
 }
 
 /// Linear base colour that the author gave, if it is not white or a grey that programs give by themselves.
 fn color(head: &Head, part: usize) -> Option<Vec3> {
-    let material = head.authored.of_parts.get(part).copied().flatten()?;
-    let [r, g, b, _] = head.authored.materials[material as usize].base_color;
+    let [r, g, b, _] = material(head, part)?.base_color;
     Some(Vec3::new(r, g, b)).filter(|c| c.max_element() - c.min_element() > 0.02)
 }
 

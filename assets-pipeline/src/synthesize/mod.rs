@@ -336,7 +336,7 @@ pub fn provenance(options: &Options) -> Vec<Provenance> {
 }
 
 /// Makes all maps of a head and puts them into it, replacing maps and their provenance, and grows brows as geometry. A head
-/// whose skin has a colour by itself keeps the maps that it has and gets those that it lacks.
+/// whose skin has a colour by itself keeps the maps that it has and gets those that it lacks, but no relief.
 ///
 /// # Errors
 /// As [`synthesize`]; the head is then unchanged.
@@ -344,8 +344,8 @@ pub fn synthesize_into(head: &mut Head, options: &Options) -> Result<(), Synthes
     synthesize_into_with(head, options, &|| ())
 }
 
-/// Gives skin that has a colour by itself what it lacks: distributions, and where landmarks say where the face is wrinkles
-/// and relief. Its own maps stay; no hair is made, as its colour holds it.
+/// Gives skin that has a colour by itself what it lacks: distributions, and where landmarks say where the face is wrinkles.
+/// Its own maps stay. No hair is made, as its colour holds it, and no relief: neutral skin is as smooth as its author made it.
 fn complete(head: &mut Head, options: &Options, step: &(dyn Fn() + Sync)) -> Result<(), SynthesizeError> {
     options.check()?;
     let own = head.maps.clone();
@@ -369,10 +369,6 @@ fn complete(head: &mut Head, options: &Options, step: &(dyn Fn() + Sync)) -> Res
         own_folds::fade_zones(head, &mut zones);
         head.maps.zones = zones;
         made.extend(["wrinkle_slopes", "zones"]);
-        if own.slopes.is_none() {
-            head.maps.slopes = from.slopes;
-            made.push("slopes");
-        }
         if own.scattering.is_none() {
             head.maps.scattering = from.scattering;
             made.push("scattering");

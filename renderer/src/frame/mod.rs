@@ -143,7 +143,8 @@ impl Passes {
         } else if self.transmittance.as_ref().is_none_or(|(p, _)| p != profile) {
             self.transmittance = Some((profile.clone(), Transmittance::new(gpu, profile)?));
         }
-        self.shade.prepare_specular(gpu, settings.quality.specular);
+        let has_own_color = scene.heads.iter().any(|h| h.head.maps.as_ref().is_some_and(|m| m.has_own_color));
+        self.shade.prepare_specular(gpu, settings.quality.specular, has_own_color);
         if self.tone_map != settings.look.tone_map {
             self.tone_map = settings.look.tone_map;
             self.resolve = Resolve::new(gpu, self.tone_map);

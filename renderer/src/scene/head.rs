@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use rubor_rig::head::{BlendShape, Head, Material, OcclusionChange, Vertex};
+use rubor_rig::head::{
+    BASE_COLOR_F0, BlendShape, Head, Material, OcclusionChange, Provenance, ProvenanceKind, SKIN_F0, Vertex,
+};
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, resize_area};
 use wgpu::util::DeviceExt;
@@ -101,10 +103,13 @@ pub(crate) struct Surface {
 
 pub(crate) struct MapsOnGpu {
     pub(crate) skin: wgpu::TextureView,
-    /// Specular intensity and roughness; with a colour of its own that colour and the intensity in alpha.
+    /// Specular intensity and roughness; with a colour of its own that colour, and in alpha the intensity over the reflectance
+    /// of glTF's materials.
     pub(crate) gloss: wgpu::TextureView,
     /// The skin has a colour by itself; its roughness is in alpha of the slopes.
     pub(crate) has_own_color: bool,
+    /// The slopes are as their author made or measured them.
+    pub(crate) has_given_relief: bool,
     pub(crate) hair_color_linear: [f32; 3],
     pub(crate) slopes: wgpu::TextureView,
     pub(crate) wrinkles: wgpu::TextureView,
@@ -417,7 +422,7 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
             let size = largest_of([albedo, specular]);
             let texel = |u, v| {
                 let [r, g, b] = [0, 1, 2].map(|c| albedo.sample(u, v, c));
-                [r, g, b, specular.sample(u, v, 0)]
+                [r, g, b, SKIN_F0 / BASE_COLOR_F0 * specular.sample(u, v, 0)]
             };
             texture::upload_srgb(gpu, "albedo", size, &[texture::mip_chain(size, texels(size, texel))])
         }
@@ -501,6 +506,7 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
         skin: texture::upload_bytes::<4>(gpu, "skin", size, &[texture::mip_chain(size, skin)]),
         gloss,
         has_own_color: maps.albedo.is_some(),
+        has_given_relief: head.provenance.iter().any(is_given_relief),
         hair_color_linear: maps.hair_color_linear,
         slopes: texture::upload_half(gpu, "slopes", slope_size, &[slope_chain]),
         wrinkles: texture::array_view(&texture::upload_half(gpu, "wrinkles", wrinkle_size, &wrinkle_layers)),
@@ -516,6 +522,12 @@ fn upload_maps(gpu: &Gpu, head: &Head) -> Option<MapsOnGpu> {
         masks: texture::array_view(&texture::upload_bytes::<4>(gpu, "zone masks", mask_size, &masks)),
         zone_maps: maps.zones.iter().map(|z| z.wrinkle_map).collect(),
     })
+}
+
+/// Whether slopes were measured or painted. Those of heads that say nothing count as made by rubor.
+fn is_given_relief(provenance: &Provenance) -> bool {
+    provenance.of == "maps.slopes"
+        && matches!(provenance.kind, ProvenanceKind::Measured | ProvenanceKind::Painted)
 }
 
 /// Evaluates a function of texture space at the texels of an image of this size.

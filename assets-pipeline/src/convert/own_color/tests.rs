@@ -223,10 +223,15 @@ fn normal_map_and_roughness_come_along_and_the_rest_is_said() {
         emission_linear: [0.1, 0.0, 0.0],
         occlusion_texture: texture(2),
         clearcoat: 0.5,
-        specular: 0.35,
+        specular: 0.7,
+        specular_texture: texture(3),
+        specular_color: [1.0, 0.5, 0.5],
+        ior: 2.0,
         ..matte(0)
     };
-    let (head, notes) = adopted(one_sheet(material, vec![face(16, 16), bumps, gloss]));
+    // Alpha 0.2 of a strength of 0.7, with an f0 of 1/9.
+    let strength = picture(1, 1, |_| [255, 255, 255, 51]);
+    let (head, notes) = adopted(one_sheet(material, vec![face(16, 16), bumps, gloss, strength]));
     let slopes = head.maps.slopes.unwrap();
     assert!(
         (slopes.values[0] - 1.0).abs() < 0.03 && slopes.values[1].abs() < 0.03,
@@ -235,14 +240,26 @@ fn normal_map_and_roughness_come_along_and_the_rest_is_said() {
     );
     let specular = head.maps.specular.unwrap();
     let [intensity, roughness] = [specular.values[0], specular.values[1]];
-    assert!((intensity - 0.5).abs() < 1e-3, "{intensity}");
+    assert!((intensity * SKIN_F0 - 0.2 * 0.7 / 9.0).abs() < 1e-6, "{intensity}");
     assert!((roughness - (0.8f32 * 128.0 / 255.0).powi(2)).abs() < 1e-3, "{roughness}");
-    for what in ["no metal", "no light", "occlusion maps", "no coat"] {
+    for what in
+        ["no metal", "no light", "occlusion maps", "no coat", "of 1.5", "reflections of skin are white"]
+    {
         assert!(says(&notes, what), "{what}: {notes:#?}");
     }
     for of in ["albedo", "melanin", "hemoglobin", "slopes", "specular"] {
         assert!(head.provenance.iter().any(|p| p.of == format!("maps.{of}")), "{of}");
     }
+}
+
+#[test]
+fn stray_texels_of_a_normal_map_are_no_cliffs() {
+    // The first texel lies on its side.
+    let bumps = picture(4, 4, |i| if i == 0 { [255, 128, 128, 255] } else { [128, 128, 255, 255] });
+    let material = AuthoredMaterial { normal_texture: texture(1), ..matte(0) };
+    let (head, _) = adopted(one_sheet(material, vec![face(16, 16), bumps]));
+    let slopes = head.maps.slopes.unwrap();
+    assert_eq!(slopes.values[0], STEEPEST);
 }
 
 #[test]

@@ -8,6 +8,9 @@ use crate::error::ExportError;
 use crate::export::image_codec::{MapEncoding, encode_colors, encode_map, encode_png};
 use crate::facial_appearance::{ChannelLayout, DistributionEntry, MapEntries, MapEntry, ZoneEntry};
 
+/// Steepest slope that 8 bits hold: half a step is 0.2 degrees.
+const MOST_IN_8_BITS: f32 = 1.0;
+
 /// How each kind of map is stored. Zone masks are always 8-bit PNG, four to an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MapEncodings {
@@ -19,7 +22,7 @@ pub struct MapEncodings {
     pub hemoglobin: MapEncoding,
     /// Scale and bias of the distributions: smooth, so banding would show; 16 bits by default.
     pub distributions: MapEncoding,
-    /// Surface slopes.
+    /// Surface slopes; 16-bit PNG in any case where they are steep.
     pub slopes: MapEncoding,
     /// Wrinkle slopes.
     pub wrinkle_slopes: MapEncoding,
@@ -96,7 +99,8 @@ pub(super) fn write(
     let melanin = optional("melanin", &maps.melanin, encodings.melanin)?;
     let hemoglobin = optional("hemoglobin", &maps.hemoglobin, encodings.hemoglobin)?;
     let hemoglobin_mean = optional("hemoglobin mean", &maps.hemoglobin_mean, encodings.distributions)?;
-    let slopes = optional("slopes", &maps.slopes, encodings.slopes)?;
+    let slopes =
+        optional("slopes", &maps.slopes, encoding_of_slopes(maps.slopes.as_ref(), encodings.slopes))?;
     let specular = optional("specular", &maps.specular, encodings.specular)?;
     let scattering = optional("scattering", &maps.scattering, encodings.scattering)?;
     let hair = optional("hair", &maps.hair, encodings.scattering)?;
@@ -125,6 +129,12 @@ pub(super) fn write(
         hair,
         hair_color_linear: maps.hair_color_linear,
     })
+}
+
+/// 16 bits where the slopes of a map lie so far apart that a step of 8 bits would tilt level skin: by half a step, as 0 is no code.
+fn encoding_of_slopes(map: Option<&Map>, encoding: MapEncoding) -> MapEncoding {
+    let steepest = map.iter().flat_map(|m| &m.values).fold(0.0f32, |most, s| most.max(s.abs()));
+    if steepest > MOST_IN_8_BITS { MapEncoding::Png16 } else { encoding }
 }
 
 /// Four masks of one size share an RGBA image; values are clamped to 0 to 1.

@@ -308,8 +308,14 @@ impl Builder<'_> {
         let recognised = names.iter().flatten().find_map(|name| recognise(name));
         let name = material.name().or(mesh.name()).or(node).unwrap_or("mesh").to_owned();
         let authored = self.materials.read(material.index(), self.notes);
-        let is_textured = self.materials.authored.materials[authored as usize].base_color_texture.is_some();
+        let look = &self.materials.authored.materials[authored as usize];
+        let is_textured = look.base_color_texture.is_some();
         let kind = match recognised {
+            // Shells before eyes are named as eyes are.
+            Some(Material::Eye) if look.is_clear() => {
+                self.notes.add("clear shells of eyes keep the look of their author", name.as_str());
+                Material::Other
+            }
             // Eyes, teeth, hair and so on of rubor take texture coordinates of its own; skin keeps its colour
             // (`convert::own_color`).
             Some(kind)

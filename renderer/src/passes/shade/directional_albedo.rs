@@ -8,6 +8,8 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 
+use super::ggx_albedo;
+
 /// Columns (cosines of the viewer) and rows (roughnesses); the first and the last are at 0 and 1.
 const SIDE: u32 = 32;
 /// Columns of the table before the mean, for the shader.
@@ -70,6 +72,20 @@ pub(crate) fn table([first, second, share]: [f32; 3]) -> Vec<[f32; 4]> {
         let of_cosines: Vec<[f32; 4]> = (0..SIDE).map(|i| texel(at(row), at(i))).collect();
         texels.extend_from_slice(&of_cosines);
         texels.push(mean(&of_cosines));
+    }
+    texels
+}
+
+/// The table with GGX by glTF's equations in the place of the skin's lobes; its alpha, the width of slopes, goes down the rows.
+pub(crate) fn table_of_base_colors() -> Vec<[f32; 4]> {
+    let mut texels = table([1.0, 1.0, 0.0]);
+    for (row, texels) in texels.chunks_exact_mut(SIZE[0] as usize).enumerate() {
+        let roughness = (row as f64 / f64::from(SIDE - 1)).sqrt();
+        for (i, texel) in texels[..SIDE as usize].iter_mut().enumerate() {
+            let [scale, bias] = ggx_albedo::scale_and_bias(roughness, i as f64 / f64::from(SIDE - 1));
+            (texel[2], texel[3]) = (scale as f32, bias as f32);
+        }
+        texels[SIDE as usize] = mean(&texels[..SIDE as usize]);
     }
     texels
 }

@@ -25,13 +25,24 @@
 //! than 1 where the albedo is at most 1 - rho(normal).
 //!
 //! Specular occlusion: the share of the lobe inside the cone of ambient visibility, which leans towards the viewer
-//! (`specular_visibility`; `docs/occlusion.md`); for the environment and for lamps without a shadow map.
+//! (`specular_visibility`; `docs/occlusion.md`); for the environment and for lamps without a shadow map, which light base
+//! colours as glTF says.
 //!
 //! Highlights of skin may have two lobes ([`SpecularMethod`]): D is their weighted mean, so the table is the same mean.
 //!
 //! Skin that has a colour by itself ([`rubor_rig::head::SkinMaps::albedo`]) shows that colour, times the ratio of the look-up's
 //! colours with the blood of the frame and with that at rest ([`rubor_rig::skin::chromophores::SkinLookup::with_blood`]); it
-//! gets no microscopic relief.
+//! gets no microscopic relief. Its maps come from a material of glTF, so lamps and sky light it by the equations of that (2.0,
+//! appendix B), as they do parts with the material of their author:
+//!
+//! ```text
+//! f = albedo / pi (1 - F(L, V))  +  F D G / (4 cos(L) cos(V))      D of GGX, one lobe whatever the specular method
+//! ```
+//!
+//! and of an even sky it sends back rho(V) + albedo (1 - rho(V)). Methods that light skin before the view is known take the normal
+//! for V.
+//!
+//! Relief that was measured or painted has the slopes of its map; that which rubor made is steepened (`RELIEF_SCALE`).
 //!
 //! Differs from the sources: slope variance lost by minification widens the Beckmann lobe (Toksvig 2005), and so
 //! does the size of a lamp; the iris is lit as a bowl behind a refracting cornea.
@@ -75,7 +86,7 @@ mod tests;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::{Vec3, Vec4};
-use rubor_rig::head::{EYE_RADIUS_MM, LIMBUS_UV, Material};
+use rubor_rig::head::{BASE_COLOR_F0, EYE_RADIUS_MM, LIMBUS_UV, Material, SKIN_F0};
 use rubor_rig::skin::chromophores::{CHANGE_FLOOR, MOST_CHANGE};
 use rubor_rig::skin::profile::Profile;
 use rubor_rig::skin::transmittance::TransmittanceTable;
@@ -151,6 +162,7 @@ fn with_constants(program: Program) -> Program {
         .constant("TABLE_COSINES", directional_albedo::COSINES)
         .constant("LEAST_HALF_SQUARE", directional_albedo::LEAST_SQUARE)
         .constant("SKIN_F0", SKIN_F0)
+        .constant("BASE_COLOR_F0", BASE_COLOR_F0)
         .constant("SKIN", Material::Skin.number())
         .constant("CHANGE_FLOOR", CHANGE_FLOOR)
         .constant("MOST_CHANGE", MOST_CHANGE)
@@ -163,8 +175,9 @@ fn with_constants(program: Program) -> Program {
         .constant("GUMS", Material::Gums.number())
 }
 
-/// Reflectance of skin seen head on, with the index 1.4.
-pub(crate) const SKIN_F0: f32 = 0.028;
+/// Factor of the slopes of relief that rubor made: its maps hold true depths, and light between pores, which makes them look
+/// deeper, is not drawn. Chosen by eye on the default head.
+const RELIEF_SCALE: f32 = 1.35;
 
 /// Entries of T(s): a step of 0.03 mm for skin.
 const TRANSMITTANCE_ENTRIES: usize = 256;
@@ -322,6 +335,8 @@ pub(crate) struct Shade {
     black_array: wgpu::TextureView,
     /// Share of an even sky that the specular lobes of a method reflect.
     directional_albedo: (SpecularMethod, wgpu::TextureView),
+    /// The same with GGX for skin; made by the first frame with skin that has a colour by itself.
+    own_albedo: Option<wgpu::TextureView>,
 }
 
 impl Shade {
@@ -338,6 +353,7 @@ impl Shade {
         let specular = SpecularMethod::OneLobe;
         Self {
             directional_albedo: (specular, upload_directional_albedo(gpu, specular)),
+            own_albedo: None,
             kernel: Kernel::new(gpu, "shade", &program, "shade"),
             samples_kernel: None,
             stored_shadows,
@@ -360,10 +376,19 @@ impl Shade {
         }
     }
 
-    /// Makes the resources of the specular method.
-    pub(crate) fn prepare_specular(&mut self, gpu: &Gpu, method: SpecularMethod) {
+    /// Makes the resources of the specular method, and of skin with a colour by itself if there is any.
+    pub(crate) fn prepare_specular(&mut self, gpu: &Gpu, method: SpecularMethod, has_own_color: bool) {
         if self.directional_albedo.0 != method {
             self.directional_albedo = (method, upload_directional_albedo(gpu, method));
+        }
+        if has_own_color && self.own_albedo.is_none() {
+            let table = vec![vec![directional_albedo::table_of_base_colors()]];
+            self.own_albedo = Some(texture::upload_half(
+                gpu,
+                "directional albedo of GGX",
+                directional_albedo::SIZE,
+                &table,
+            ));
         }
     }
 
@@ -504,6 +529,7 @@ impl Shade {
         params: &'a wgpu::Buffer,
     ) -> Vec<Resource<'a>> {
         let maps = posed.head.maps.as_ref();
+        let own_albedo = self.own_albedo.as_ref().filter(|_| maps.is_some_and(|m| m.has_own_color));
         vec![
             ("view", lighting.seen.view.bound()),
             ("params", params.bound()),
@@ -514,7 +540,7 @@ impl Shade {
             ("linear_clamp", self.linear_clamp.bound()),
             ("compare", self.compare.bound()),
             ("transmittance", lighting.transmittance.map_or(&self.black, |t| &t.table).bound()),
-            ("directional_albedo", self.directional_albedo.1.bound()),
+            ("directional_albedo", own_albedo.unwrap_or(&self.directional_albedo.1).bound()),
             ("positions", posed.positions.bound()),
             ("vertices", posed.head.vertices.bound()),
             ("triangles", posed.head.triangles.bound()),
@@ -557,8 +583,7 @@ pub(crate) fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
         ColorMethod::Hemoglobin => posed.state.hemoglobin_scale,
     };
     Params {
-        // Maps hold true depths. Interreflection between pores, which would make them look deeper, is not drawn.
-        slope_scale: 1.35,
+        slope_scale: if maps.is_some_and(|m| m.has_given_relief) { 1.0 } else { RELIEF_SCALE },
         wrinkle_strength: 1.25,
         // Keeps the product finite: blood beyond its range is clamped, NaN would not be.
         hemoglobin_scale: hemoglobin_scale.clamp(-1e6, 1e6),
@@ -577,7 +602,10 @@ pub(crate) fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
             | u32::from(maps.is_some_and(|m| m.has_own_color)) << 1,
         pupil_mm: posed.state.pupil_mm,
         transmit_per_mm: lighting.transmittance.map_or(0.0, |t| 1.0 / t.thickness_max_mm),
-        lobes: quality.specular.lobes(),
+        lobes: match maps {
+            Some(maps) if maps.has_own_color => SpecularMethod::OneLobe.lobes(),
+            _ => quality.specular.lobes(),
+        },
         mm_per_texture: posed.head.mm_per_texture,
         ring_taps_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_taps_mm),
         ring_ends_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_ends_mm),

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use rubor_rig::head::SKIN_F0;
 
-use super::SKIN_F0;
 use super::directional_albedo::{LEAST_SQUARE, scale_and_bias};
 
 /// Bare skin with one specular lobe.

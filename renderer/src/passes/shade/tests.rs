@@ -3,18 +3,21 @@
 use glam::{DVec3, Mat4, Vec2, Vec3};
 use rubor_rig::color::{srgb_decode, srgb_encode};
 use rubor_rig::face_state::FaceState;
-use rubor_rig::head::{Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex};
+use rubor_rig::head::{
+    BASE_COLOR_F0, Distribution, Head, Material, Mesh, Part, Provenance, ProvenanceKind, SKIN_F0, SkinMaps,
+    Vertex,
+};
 use rubor_rig::map::Map;
 use rubor_rig::random::SplitMix64;
 use rubor_rig::skin::chromophores::{ChromophoreModel, MAX_HEMOGLOBIN, MAX_MELANIN, SkinModel};
 
 use super::reference;
 use crate::channels::Channel;
-use crate::settings::{ScatterMethod, TransmitMethod};
+use crate::settings::{ScatterMethod, SpecularMethod, TransmitMethod};
 use crate::tests::{
     WHITE_TABLE, dome, read, read_texels, read_vectors, render, renderer, seen_surface, settings,
 };
-use crate::{Camera, ColorTable, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
+use crate::{Camera, ColorTable, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
 const SIZE: u32 = 128;
 /// Across the picture.
@@ -102,7 +105,7 @@ fn light_spreads_in_teeth_and_not_in_what_is_opaque() {
 
 #[test]
 fn lobes_keep_the_mean_square_slope() {
-    for method in crate::settings::SpecularMethod::all() {
+    for method in SpecularMethod::all() {
         let [first, second, share] = method.lobes();
         let square = (1.0 - share) * first * first + share * second * second;
         assert!((square - 1.0).abs() < 2e-3, "{method} keeps the mean square slope: {square}");
@@ -185,6 +188,81 @@ fn a_lamp_on_bare_skin_is_the_equation() {
             largest_error(&renderer, &head, &camera, size, &lamp, |n, l, v| skin.radiance(n, l, v));
         // The table of reflected shares is linear between 32 cosines and 32 roughnesses; halves keep 11 bits.
         assert!(compared > 200 && largest < 0.01, "{direction}: {compared} pixels, error up to {largest}");
+    }
+}
+
+/// The dome without relief and hair, of a base colour and an alpha of GGX.
+fn dome_of_own_color(base: f32, alpha: f32) -> Head {
+    let mut head = dome();
+    head.maps.slopes = None;
+    head.maps.hair = None;
+    head.maps.albedo = Some(Map::filled(1, 1, &[base; 3]));
+    head.maps.specular = Some(Map::filled(1, 1, &[BASE_COLOR_F0 / SKIN_F0, alpha]));
+    head.mesh.occlusion.clear();
+    head.shapes.iter_mut().for_each(|shape| shape.occlusion.clear());
+    head
+}
+
+#[test]
+fn light_on_skin_of_its_own_colour_is_that_of_a_base_colour() {
+    let Some(mut renderer) = renderer() else { return };
+    let camera = Camera { position: 0.5 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 };
+    let size = 45;
+    let directions = [Vec3::new(0.1, -0.2, -1.0), Vec3::new(-0.8, -0.5, -0.6), Vec3::new(0.9, 0.3, -0.4)];
+    let lamps = directions.map(|direction| Light {
+        kind: LightKind::Directional { direction },
+        color_linear: Vec3::new(2.0, 1.0, 0.5),
+        radius: 0.0,
+        casts_shadow: false,
+    });
+    // The map keeps the colour in sRGB codes.
+    let base = srgb_decode(srgb_encode(0.3).mul_add(255.0, 0.5).floor() / 255.0);
+    for (alpha, specular) in
+        [(0.25f32, SpecularMethod::OneLobe), (0.64, SpecularMethod::TwoLobes), (1.0, SpecularMethod::OneLobe)]
+    {
+        let head = dome_of_own_color(base, alpha);
+        let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("it uploads");
+        let state = FaceState::neutral(&head);
+        let sky = EnvironmentMap { width: 8, height: 4, texels: vec![Vec3::ONE; 32] }.upload(renderer.gpu());
+        let mut settings = settings([size; 2]);
+        settings.quality.scatter = ScatterMethod::None;
+        settings.quality.transmit = TransmitMethod::None;
+        settings.quality.specular = specular;
+        let mut scene = Scene {
+            heads: &[HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }],
+            camera,
+            lights: &[],
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 1.0,
+            background_linear: Vec3::ZERO,
+        };
+        let expected = reference::MetallicRoughness {
+            base: f64::from(base),
+            metallic: 0.0,
+            roughness: f64::from(alpha).sqrt(),
+        };
+        for lamp in &lamps {
+            scene.lights = std::slice::from_ref(lamp);
+            render(&mut renderer, &scene, &settings).expect("it draws");
+            let (compared, largest) =
+                largest_error(&renderer, &head, &camera, size, lamp, |n, l, v| expected.radiance(n, l, v));
+            assert!(
+                compared > 200 && largest < 0.005,
+                "{alpha} {:?}: {compared} pixels, error up to {largest}",
+                lamp.kind
+            );
+        }
+        // Of an even sky: what is reflected, and the colour of the rest. The middle of the picture sees the dome from in front.
+        scene.lights = &[];
+        scene.environment = Some(&sky);
+        render(&mut renderer, &scene, &settings).expect("it draws");
+        let found =
+            f64::from(read_texels(&renderer, Channel::Radiance)[(size / 2 * size + size / 2) as usize][1]);
+        let mirror = reference::MetallicRoughness { base: 0.04, metallic: 1.0, ..expected };
+        let share = mirror.reflected_sky(1.0);
+        let sum = share + (1.0 - share) * f64::from(base);
+        assert!((found - sum).abs() < 0.006, "{alpha}: {found}, expected {sum}");
     }
 }
 
@@ -271,5 +349,58 @@ fn skin_of_its_own_colour_shows_it_and_follows_blood() {
             let expected = (change[c] * before[c]).min(1.0);
             assert!((found[c] - expected).abs() < 0.01 * expected + 1e-3, "texel {i}: {found:?}, {expected}");
         }
+    }
+}
+
+#[test]
+fn relief_that_was_given_has_the_slopes_of_its_map() {
+    let Some(mut renderer) = renderer() else { return };
+    let slope = 0.5f32;
+    let flat = |v| Map::filled(1, 1, &[v]);
+    let (mut head, camera) = sheet(SkinMaps {
+        melanin: Some(flat(0.02)),
+        hemoglobin: Some(flat(0.02)),
+        slopes: Some(Map::filled(1, 1, &[slope, 0.0])),
+        // No reflection, so that light is the cosine.
+        specular: Some(Map::filled(1, 1, &[0.0, 0.4])),
+        ..SkinMaps::default()
+    });
+    let size = 16;
+    let mut settings = settings([size; 2]);
+    settings.quality.scatter = ScatterMethod::None;
+    settings.quality.transmit = TransmitMethod::None;
+    let mut light_over_flat = |head: &Head, expected: f32| {
+        let on_gpu = HeadOnGpu::new(renderer.gpu(), head, &WHITE_TABLE).expect("it uploads");
+        let state = FaceState::neutral(head);
+        let kind = LightKind::Directional { direction: -Vec3::Z };
+        let scene = Scene {
+            heads: &[HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }],
+            camera,
+            lights: &[Light { kind, color_linear: Vec3::ONE, radius: 0.0, casts_shadow: false }],
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+        };
+        render(&mut renderer, &scene, &settings).expect("it draws");
+        let middle = read_texels(&renderer, Channel::Irradiance)[(size / 2 * size + size / 2) as usize][1];
+        let cosine = 1.0 / (1.0 + (expected * slope).powi(2)).sqrt();
+        let found = middle * std::f32::consts::PI;
+        assert!((found - cosine).abs() < 0.01, "{found}, expected {cosine}");
+    };
+    // A head that says nothing has relief that rubor made.
+    light_over_flat(&head, super::RELIEF_SCALE);
+    for (kind, scale) in [
+        (ProvenanceKind::Synthesised, super::RELIEF_SCALE),
+        (ProvenanceKind::Painted, 1.0),
+        (ProvenanceKind::Measured, 1.0),
+    ] {
+        head.provenance = vec![Provenance {
+            of: "maps.slopes".into(),
+            kind,
+            source: String::new(),
+            licence: "CC0-1.0".into(),
+        }];
+        light_over_flat(&head, scale);
     }
 }
