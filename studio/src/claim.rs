@@ -22,6 +22,7 @@ use crate::error::{Failure, Outcome};
 use crate::job::{FrameList, Job};
 use crate::notes::Note;
 use crate::output;
+use crate::review::page::PAGE_FILE;
 use crate::run::{HEAD_FILE, JOB_FILE, SHEET_FILE, STATS_FILE, VIDEO_FILE};
 
 /// Name of the lock; the file is there while a run works in the folder.
@@ -36,6 +37,8 @@ pub(crate) struct Claim<'a> {
     pub(crate) is_new: bool,
     /// The other frames in the folder are of the same job.
     keeps_others: bool,
+    /// The frames that the folder has after the run; none is all of the sequence.
+    frames: Option<FrameList>,
     /// The job that the folder has to hold before the first frame.
     to_write: Option<Cow<'a, Job>>,
     /// What killed runs left is gone.
@@ -55,6 +58,7 @@ impl<'a> Claim<'a> {
             folder,
             is_new: true,
             keeps_others: false,
+            frames: job.frames.clone(),
             to_write: Some(Cow::Borrowed(job)),
             is_clean: false,
             lock,
@@ -79,8 +83,14 @@ impl<'a> Claim<'a> {
         }
         let both =
             before.frames.as_ref().zip(job.frames.as_ref()).map(|(a, b): (&FrameList, &FrameList)| a.and(b));
+        let frames = both.clone();
         let to_write = (both != before.frames).then(|| Cow::Owned(Job { frames: both, ..job.clone() }));
-        Ok(Self { folder, is_new: !resume, keeps_others: true, to_write, is_clean: false, lock })
+        Ok(Self { folder, is_new: !resume, keeps_others: true, frames, to_write, is_clean: false, lock })
+    }
+
+    /// The frames of the job that the folder may have after the run; none is all of the sequence.
+    pub(crate) fn frames(&self) -> Option<&FrameList> {
+        self.frames.as_ref()
     }
 
     /// Makes the folder that of the job; later calls do nothing. Returns what there is to say.
@@ -125,7 +135,7 @@ fn remove_results(folder: &Path) -> Outcome<usize> {
 
 /// Names that a run gives: `frame.0001.png`, `frame.0001.CHANNEL.exr`, and those of the whole.
 fn is_result(name: &str) -> bool {
-    if [STATS_FILE, SHEET_FILE, VIDEO_FILE, HEAD_FILE].contains(&name) {
+    if [STATS_FILE, SHEET_FILE, VIDEO_FILE, HEAD_FILE, PAGE_FILE].contains(&name) {
         return true;
     }
     let Some((number, rest)) = name.strip_prefix("frame.").and_then(|n| n.split_once('.')) else {

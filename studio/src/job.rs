@@ -116,6 +116,12 @@ impl Fingerprint {
     }
 }
 
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
 impl Job {
     /// A performance on heads, with default settings of the size that the sequence asks for.
     ///
@@ -265,6 +271,15 @@ impl Job {
     pub fn draws_like(&self, other: &Self) -> Outcome<bool> {
         let text = |job: &Self| Self { frames: None, schema: None, ..job.clone() }.to_json();
         Ok(text(self)? == text(other)?)
+    }
+
+    /// A number that changes with the pixels of the job: that of its text, whichever frames it draws.
+    ///
+    /// # Errors
+    /// A number that JSON cannot represent.
+    pub fn identity(&self) -> Outcome<Fingerprint> {
+        let all = Self { frames: None, schema: None, ..self.clone() };
+        Ok(Fingerprint::of(all.to_json()?.as_bytes()))
     }
 
     /// JSON schema of the file.

@@ -86,6 +86,11 @@ impl<'a> Plan<'a> {
         self.heads
     }
 
+    /// The performance on the first head.
+    pub fn evaluator(&self) -> Option<&Evaluator> {
+        self.evaluators.first()
+    }
+
     /// Frames of the job by their index from 0, ascending.
     pub fn frames(&self) -> &[u32] {
         &self.frames

@@ -3,7 +3,7 @@
 //! ```text
 //! Plan --draw--> frame n+1 | writers: frame n --> frame.0001.png ...
 //!                                        +--> contact_sheet.png, video.mp4
-//! heads --------> animated_head.glb      job.json, stats.json
+//! heads --------> animated_head.glb      job.json, stats.json --> review.html
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,6 +22,7 @@ use crate::output;
 use crate::plan::{Plan, Shown};
 use crate::report::{JobReport, PassTimes, Report, median};
 use crate::review::inset::Inset;
+use crate::review::page::{self, FrameCost, PAGE_FILE, PageData};
 use crate::review::{contact_sheet, video};
 use crate::stop::Stop;
 use crate::studio::{Frame, Studio};
@@ -122,7 +123,7 @@ pub fn run(
 
     let mut times = PassTimes::default();
     let mut first_frame_s = None;
-    let mut seconds = Vec::new();
+    let mut costs: BTreeMap<u32, FrameCost> = BTreeMap::new();
     let write = |page: Page| -> Outcome<Written> {
         let Page { place, shown: Shown { frame, shots, drawn } } = page;
         let mut picture = drawn.picture();
@@ -147,9 +148,12 @@ pub fn run(
         plan.draw(studio, &to_draw, |shown| {
             // With the first frame, so that a job that cannot be drawn leaves nothing.
             notes.extend(claim.take()?);
-            seconds.push(since.elapsed().as_secs_f64());
+            let seconds = since.elapsed().as_secs_f64();
             since = Instant::now();
-            times.add(&shown.drawn.stats);
+            let stats = &shown.drawn.stats;
+            times.add(stats);
+            let passes_ms = stats.passes_ms.iter().map(|(name, ms)| (*name, *ms)).collect();
+            costs.insert(shown.frame, FrameCost { seconds, passes_ms });
             let place = plan.frames().partition_point(|f| *f < shown.frame);
             push(Page { place, shown })?;
             stop_if_asked(&to.stop)
@@ -188,6 +192,21 @@ pub fn run(
         export_animated(plan, &to.folder)?;
         files.push(HEAD_FILE.into());
     }
+    // Frames that other runs of this job left are on the page too.
+    let mut on_page: Vec<u32> = match claim.frames() {
+        None => (0..plan.evaluator().map_or(0, |evaluator| evaluator.frame_count())).collect(),
+        Some(list) => list.numbers().iter().map(|number| number - 1).collect(),
+    };
+    on_page.retain(|frame| frame_path(&to.folder, *frame).is_file());
+    if on_page.len() > page::MOST_FRAMES {
+        let found = format!("no page: found {} frames, expected at most {}", on_page.len(), page::MOST_FRAMES);
+        let note = Note::new(PAGE_FILE, found);
+        watch.notes(std::slice::from_ref(&note));
+        notes.push(note);
+    } else {
+        files.push(PAGE_FILE.into());
+    }
+    let mut seconds: Vec<f64> = costs.values().map(|cost| cost.seconds).collect();
     let report = JobReport {
         adapter: studio.adapter(),
         settings: job.settings.clone(),
@@ -206,6 +225,11 @@ pub fn run(
         notes: summed(&notes),
     };
     output::write_json(&to.folder.join(STATS_FILE), &Report::Job(report.clone()))?;
+    if on_page.len() <= page::MOST_FRAMES {
+        let inset = job.inset.zip(inset.as_ref());
+        let data = PageData::new(plan, &on_page, &to.folder, inset, &costs, &report)?;
+        data.write(&to.folder.join(PAGE_FILE))?;
+    }
     match failed {
         Some(failure) => Err(failure),
         None => Ok(report),

@@ -60,11 +60,14 @@ fn render<'a>(sequence: &'a str, out: &'a str, more: &[&'a str]) -> Vec<&'a str>
     [&["render", "--sequence", sequence, "-o", out][..], FAST, more].concat()
 }
 
+/// Files with measured times.
+const MEASURED: [&str; 2] = ["stats.json", "review.html"];
+
 /// Files of a folder with their bytes, but for what was measured.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = std::fs::read_dir(folder).expect("the folder").map(|e| e.expect("an entry").path());
     let name = |p: &Path| p.file_name().expect("a name").to_string_lossy().into_owned();
-    let files = entries.filter(|p| p.is_file() && name(p) != "stats.json");
+    let files = entries.filter(|p| p.is_file() && !MEASURED.contains(&name(p).as_str()));
     files.map(|p| (name(&p), std::fs::read(&p).expect("a file"))).collect()
 }
 
