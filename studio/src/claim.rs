@@ -20,9 +20,11 @@ use rubor_renderer::channels::CHANNELS;
 
 use crate::error::{Failure, Outcome};
 use crate::job::{FrameList, Job};
+use crate::manifest::MANIFEST_FILE;
 use crate::notes::Note;
 use crate::output;
 use crate::review::page::PAGE_FILE;
+use crate::review::timeline::TIMELINE_FILE;
 use crate::run::{HEAD_FILE, JOB_FILE, SHEET_FILE, STATS_FILE, VIDEO_FILE};
 
 /// Name of the lock; the file is there while a run works in the folder.
@@ -133,9 +135,10 @@ fn remove_results(folder: &Path) -> Outcome<usize> {
     Ok(removed)
 }
 
-/// Names that a run gives: `frame.0001.png`, `frame.0001.CHANNEL.exr`, and those of the whole.
-fn is_result(name: &str) -> bool {
-    if [STATS_FILE, SHEET_FILE, VIDEO_FILE, HEAD_FILE, PAGE_FILE].contains(&name) {
+/// Names that a run gives: `frame.0001.png`, `frame.0001.exr`, `frame.0001.CHANNEL.exr`, and those of the whole.
+pub(crate) fn is_result(name: &str) -> bool {
+    let whole = [STATS_FILE, SHEET_FILE, VIDEO_FILE, HEAD_FILE, PAGE_FILE, TIMELINE_FILE, MANIFEST_FILE];
+    if whole.contains(&name) {
         return true;
     }
     let Some((number, rest)) = name.strip_prefix("frame.").and_then(|n| n.split_once('.')) else {
@@ -143,7 +146,7 @@ fn is_result(name: &str) -> bool {
     };
     let is_number = number.len() >= 4 && number.bytes().all(|b| b.is_ascii_digit());
     let is_channel = |c: &str| CHANNELS.iter().any(|row| row.channel.name() == c);
-    is_number && (rest == "png" || rest.strip_suffix(".exr").is_some_and(is_channel))
+    is_number && (["png", "exr"].contains(&rest) || rest.strip_suffix(".exr").is_some_and(is_channel))
 }
 
 /// The lock of a folder. The system gives it up when the process ends, however that happens.
@@ -241,7 +244,17 @@ mod tests {
 
     #[test]
     fn only_results_of_runs_are_removed() {
-        for name in ["frame.0001.png", "frame.12345.png", "frame.0001.depth.exr", "stats.json", "video.mp4"] {
+        for name in [
+            "frame.0001.png",
+            "frame.12345.png",
+            "frame.0001.exr",
+            "frame.0001.depth.exr",
+            "stats.json",
+            "video.mp4",
+            "review.html",
+            "sequence.otio",
+            "manifest.json",
+        ] {
             assert!(is_result(name), "{name}");
         }
         for name in

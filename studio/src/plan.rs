@@ -7,8 +7,11 @@
 //!
 //! Frames do not depend on which others are drawn. Antialiasing over time mixes the light of the previous frame into a
 //! frame, depending on the speeds of both, and the speed of the previous frame comes from positions one frame earlier.
-//! So where a frame does not follow the last one drawn, the two before it are drawn first, after a cut.
+//! So where a frame does not follow the last one drawn, the two before it are drawn first, after a cut. For motion as a
+//! channel it is the one before.
 
+use rubor_renderer::channels::Channel;
+use rubor_renderer::settings::Settings;
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::head::Head;
 
@@ -29,6 +32,7 @@ pub struct Plan<'a> {
     heads: &'a [LoadedHead],
     evaluators: Vec<Evaluator>,
     frames: Vec<u32>,
+    settings: Settings,
     spacing_m: f32,
     notes: Vec<Note>,
 }
@@ -73,7 +77,7 @@ impl<'a> Plan<'a> {
             notes.push(Note::new("sequence", hint));
         }
         let spacing_m = spacing_m(heads.iter().map(|h| &h.head));
-        Ok(Self { job, heads, evaluators, frames, spacing_m, notes })
+        Ok(Self { job, heads, evaluators, frames, settings: job.drawn_settings(), spacing_m, notes })
     }
 
     /// The job.
@@ -132,8 +136,11 @@ impl<'a> Plan<'a> {
         frames: &[u32],
         mut take: impl FnMut(Shown) -> Outcome,
     ) -> Outcome {
-        let settings = &self.job.settings;
-        let before = if settings.quality.antialias.is_temporal() { REMEMBERED_FRAMES } else { 0 };
+        let settings = &self.settings;
+        let before = match settings.quality.antialias.is_temporal() {
+            true => REMEMBERED_FRAMES,
+            false => u32::from(settings.output.channels.contains(&Channel::Velocity)),
+        };
         let mut last = None;
         let mut waiting = None;
         for &frame in frames {

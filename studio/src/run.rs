@@ -1,9 +1,9 @@
 //! The main job: the frames of a plan to a folder, with everything that a review needs beside them.
 //!
 //! ```text
-//! Plan --draw--> frame n+1 | writers: frame n --> frame.0001.png ...
-//!                                        +--> contact_sheet.png, video.mp4
-//! heads --------> animated_head.glb      job.json, stats.json --> review.html
+//! Plan --draw--> frame n+1 | writers: frame n --> frame.0001.png, frame.0001.exr ...
+//!                                        +--> contact_sheet.png, video.mp4, sequence.otio
+//! heads --------> animated_head.glb      job.json, stats.json --> review.html --> manifest.json
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,16 +14,19 @@ use image::RgbImage;
 use rubor_assets::{export, files};
 use rubor_renderer::footprint;
 
-use crate::claim::Claim;
+use crate::claim::{self, Claim};
 use crate::error::{Failure, Fault, Outcome};
-use crate::job::Job;
+use crate::job::{Format, Job};
+use crate::layers;
+use crate::manifest::{MANIFEST_FILE, Manifest};
 use crate::notes::{Note, summed};
 use crate::output;
 use crate::plan::{Plan, Shown};
 use crate::report::{JobReport, PassTimes, Report, median};
 use crate::review::inset::Inset;
 use crate::review::page::{self, FrameCost, PAGE_FILE, PageData};
-use crate::review::{contact_sheet, video};
+use crate::review::timeline::{self, TIMELINE_FILE};
+use crate::review::{contact_sheet, text, video};
 use crate::stop::Stop;
 use crate::studio::{Frame, Studio};
 use crate::watch::Watch;
@@ -51,6 +54,8 @@ pub struct Destination {
     pub chunks: Option<PathBuf>,
     /// Make a video, if the job has all frames.
     pub video: bool,
+    /// Write frame, time and expressions onto the pictures of the video.
+    pub burn_in: bool,
     /// Write the first head with its performance.
     pub animated_head: bool,
     /// Asks the run to stop after the frame at hand.
@@ -61,7 +66,15 @@ impl Destination {
     /// Everything into a folder, all of it new.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         let stop = Stop::default();
-        Self { folder: folder.into(), resume: false, chunks: None, video: true, animated_head: true, stop }
+        Self {
+            folder: folder.into(),
+            resume: false,
+            chunks: None,
+            video: true,
+            burn_in: false,
+            animated_head: true,
+            stop,
+        }
     }
 }
 
@@ -130,7 +143,7 @@ pub fn run(
         if let (Some(inset), Some(shot)) = (&inset, shots.first()) {
             inset.draw(&shot.face, &job.settings.quality, &mut picture);
         }
-        save_channels(&to.folder, frame, &drawn)?;
+        save_channels(job, &to.folder, frame, &drawn)?;
         // Written last: if the picture of a frame exists, the frame is complete.
         output::save_picture(&frame_path(&to.folder, frame), &picture)?;
         let small = on_sheet.contains(&(place as u32)).then(|| contact_sheet::reduce(&picture));
@@ -171,16 +184,17 @@ pub fn run(
     watch.notes(&of_surroundings);
     notes.extend(of_surroundings);
     let mut files = vec![PathBuf::from(SHEET_FILE)];
-    let small: Vec<RgbImage> = sheet.into_values().collect();
+    let label = |place: usize| plan.frames().get(place).map(|frame| moment(plan, *frame)).unwrap_or_default();
+    let small: Vec<(RgbImage, String)> =
+        sheet.into_iter().map(|(place, small)| (small, label(place))).collect();
     output::save_picture(&to.folder.join(SHEET_FILE), &contact_sheet::page(&small))?;
     // A video that fails costs neither the head nor the report.
     let mut failed = None;
     if to.video && job.frames.is_none() {
-        match video::encode(&to.folder, plan.frames().len(), job.sequence.fps, VIDEO_FILE) {
+        match make_video(plan, to) {
             Ok(video::Video::Written) => files.push(VIDEO_FILE.into()),
             Ok(video::Video::NoEncoder) => {
-                let message = "no video: the program ffmpeg is not on this machine (Debian, Ubuntu: ffmpeg)";
-                let note = Note::new("", message);
+                let note = Note::new("", video::NO_ENCODER);
                 watch.notes(std::slice::from_ref(&note));
                 notes.push(note);
             }
@@ -198,14 +212,23 @@ pub fn run(
         Some(list) => list.numbers().iter().map(|number| number - 1).collect(),
     };
     on_page.retain(|frame| frame_path(&to.folder, *frame).is_file());
+    if let [first, .., last] | [first @ last] = on_page[..] {
+        let name = page::title(&to.folder);
+        let video = files.iter().any(|file| file.as_os_str() == VIDEO_FILE).then_some(VIDEO_FILE);
+        let clip = timeline::Clip { name: &name, frames: [first + 1, last + 1], video };
+        output::write_json(&to.folder.join(TIMELINE_FILE), &timeline::of(&job.sequence, &clip))?;
+        files.push(TIMELINE_FILE.into());
+    }
     if on_page.len() > page::MOST_FRAMES {
-        let found = format!("no page: found {} frames, expected at most {}", on_page.len(), page::MOST_FRAMES);
+        let found =
+            format!("no page: found {} frames, expected at most {}", on_page.len(), page::MOST_FRAMES);
         let note = Note::new(PAGE_FILE, found);
         watch.notes(std::slice::from_ref(&note));
         notes.push(note);
     } else {
         files.push(PAGE_FILE.into());
     }
+    files.push(MANIFEST_FILE.into());
     let mut seconds: Vec<f64> = costs.values().map(|cost| cost.seconds).collect();
     let report = JobReport {
         adapter: studio.adapter(),
@@ -230,6 +253,8 @@ pub fn run(
         let data = PageData::new(plan, &on_page, &to.folder, inset, &costs, &report)?;
         data.write(&to.folder.join(PAGE_FILE))?;
     }
+    let is_listed = |name: &str| name == JOB_FILE || claim::is_result(name);
+    Manifest::of(&to.folder, is_listed)?.write(&to.folder)?;
     match failed {
         Some(failure) => Err(failure),
         None => Ok(report),
@@ -268,6 +293,9 @@ fn gather(job: &Job, chunks: &Path, folder: &Path) -> Outcome {
                 let name = channel.name();
                 copy(channel_path(&run, frame, &name), channel_path(folder, frame, &name))?;
             }
+            if job.format == Format::Exr {
+                copy(layers_path(&run, frame), layers_path(folder, frame))?;
+            }
             copy(frame_path(&run, frame), frame_path(folder, frame))?;
         }
     }
@@ -302,21 +330,76 @@ pub fn channel_path(folder: &Path, frame: u32, channel: &str) -> PathBuf {
     folder.join(format!("frame.{:04}.{channel}.exr", frame + 1))
 }
 
+/// The file of the layers of a frame, from 0; files are numbered from 1.
+pub fn layers_path(folder: &Path, frame: u32) -> PathBuf {
+    folder.join(format!("frame.{:04}.exr", frame + 1))
+}
+
 /// Whether a frame exists with all its channels, complete and of the right size.
 fn read_frame(job: &Job, folder: &Path, frame: u32, size: [u32; 2]) -> Option<RgbImage> {
     let mut channels = job.settings.output.channels.iter();
-    if channels.any(|c| !channel_path(folder, frame, &c.name()).is_file()) {
+    if channels.any(|c| !channel_path(folder, frame, &c.name()).is_file())
+        || (job.format == Format::Exr && !layers_path(folder, frame).is_file())
+    {
         return None;
     }
     let image = image::open(frame_path(folder, frame)).ok()?.into_rgb8();
     (image.dimensions() == (size[0], size[1])).then_some(image)
 }
 
-fn save_channels(folder: &Path, frame: u32, drawn: &Frame) -> Outcome {
-    drawn
-        .channels
-        .iter()
-        .try_for_each(|data| output::save_channel(&channel_path(folder, frame, &data.channel.name()), data))
+fn save_channels(job: &Job, folder: &Path, frame: u32, drawn: &Frame) -> Outcome {
+    let output = &job.settings.output;
+    for data in drawn.channels.iter().filter(|data| output.channels.contains(&data.channel)) {
+        output::save_channel(&channel_path(folder, frame, &data.channel.name()), data)?;
+    }
+    if job.format == Format::Png {
+        return Ok(());
+    }
+    let about = layers::About {
+        size: output.size,
+        number: frame + 1,
+        fps: job.sequence.fps,
+        near_metres: rubor_renderer::NEAR_METRES,
+    };
+    layers::write(&layers_path(folder, frame), &drawn.channels, &about)
+}
+
+/// A frame in words: its number, its time, and the expressions and states that show, the strongest first.
+fn moment(plan: &Plan<'_>, frame: u32) -> String {
+    // Weights under this do not show.
+    const LEAST: f32 = 0.05;
+    let Some(evaluator) = plan.evaluator() else { return String::new() };
+    let time_s = evaluator.frame_time_s(frame);
+    let (rig, weights) = (evaluator.rig(), evaluator.weights_at(time_s));
+    let expressions = rig.expression_names().zip(&weights.expressions);
+    let mut shown: Vec<(&str, f32)> = expressions
+        .chain(rig.state_names().zip(&weights.states))
+        .map(|(name, weight)| (name, *weight))
+        .filter(|(_, weight)| *weight >= LEAST)
+        .collect();
+    shown.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let shown: String = shown.iter().map(|(name, weight)| format!("  {name} {weight:.2}")).collect();
+    format!("{:04}  {time_s:.2} s{shown}", frame + 1)
+}
+
+/// Encodes the frames.
+fn make_video(plan: &Plan<'_>, to: &Destination) -> Outcome<video::Video> {
+    let pictures = plan.frames().iter().map(|frame| {
+        let path = frame_path(&to.folder, *frame);
+        let mut picture = image::open(&path).map_err(|e| Failure::read(&path, e))?.into_rgb8();
+        if to.burn_in {
+            let height = letters(picture.height());
+            text::draw_on_picture(&mut picture, [height; 2], height, &moment(plan, *frame));
+        }
+        Ok(picture)
+    });
+    let job = plan.job();
+    video::encode(&to.folder.join(VIDEO_FILE), job.settings.output.size, job.sequence.fps, pictures)
+}
+
+/// Height of capitals on a picture, pixels.
+pub(crate) fn letters(picture_height: u32) -> f32 {
+    (picture_height as f32 / 40.0).max(8.0)
 }
 
 /// Writes the (first) head with its performance.

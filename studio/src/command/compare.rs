@@ -1,11 +1,13 @@
-//! `rubor compare A B`: measures the difference of two images, or of the images of two folders; two runs on one page.
+//! `rubor compare A B`: measures the difference of two images, or of the images of two folders; two runs on one page or in
+//! one video.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rubor::measure::difference::{Compared, Difference, of_files};
 use rubor::notes::Note;
-use rubor::review::versus::{self, RunFolder};
+use rubor::review::versus::{self, Layout, RunFolder};
+use rubor::review::video::{NO_ENCODER, Video};
 use rubor::{Failure, Outcome, output};
 use rubor_assets::compare::flip;
 use serde::Serialize;
@@ -30,6 +32,12 @@ pub(crate) struct Arguments {
     /// Page of two runs, in a folder with their frames that can be moved and sent: wipe, difference, notes
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     page: Option<PathBuf>,
+    /// Video (.mp4) of the frames that two runs share
+    #[arg(long, value_name = "FILE", conflicts_with = "output")]
+    video: Option<PathBuf>,
+    /// How the video shows both
+    #[arg(long, value_enum, value_name = "LAYOUT", default_value = "side-by-side", requires = "video")]
+    layout: Layout,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -48,7 +56,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     if !(ppd.is_finite() && (1.0..=1000.0).contains(&ppd)) {
         return Err(Failure::input(format!("--pixels-per-degree: found {ppd}, expected 1 to 1000")));
     }
-    if arguments.page.is_some() {
+    if arguments.page.is_some() || arguments.video.is_some() {
         return runs(arguments);
     }
     let is_folder = arguments.reference.is_dir();
@@ -111,7 +119,7 @@ fn runs(arguments: &Arguments) -> Outcome {
     for folder in [&arguments.test, &arguments.reference] {
         if !folder.is_dir() {
             let found = if folder.exists() { "a file" } else { "no such folder" };
-            let expected = "expected the folder of a run, as --page needs";
+            let expected = "expected the folder of a run, as --page and --video need";
             return Err(Failure::input(format!("{}: found {found}, {expected}", folder.display())));
         }
     }
@@ -139,6 +147,12 @@ fn runs(arguments: &Arguments) -> Outcome {
     if let Some(folder) = &arguments.page {
         let path = versus::page(&test, &reference, &differences, folder)?;
         console::error_line(format_args!("page: {}", path.display()));
+    }
+    if let Some(path) = &arguments.video {
+        match versus::video(&test, &reference, arguments.layout, path)? {
+            Video::Written => console::error_line(format_args!("video: {}", path.display())),
+            Video::NoEncoder => return Err(Failure::job(NO_ENCODER)),
+        }
     }
     let rows: Vec<Row> = differences
         .into_iter()

@@ -3,6 +3,8 @@
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 
+use super::text;
+
 /// Frames on a page.
 const MOST: usize = 48;
 /// Frames per row.
@@ -10,6 +12,10 @@ const COLUMNS: u32 = 8;
 /// Width of a small frame, pixels.
 const WIDTH: u32 = 200;
 const GAP: u32 = 4;
+/// Height of the line under a frame, and of its capitals, pixels.
+const LABEL: u32 = 18;
+const LETTERS: f32 = 8.0;
+const BACKGROUND: image::Rgb<u8> = image::Rgb([24, 24, 26]);
 
 /// Indices of the frames, of `count`, that the page shows, ascending.
 pub fn choose(count: u32) -> Vec<u32> {
@@ -23,9 +29,19 @@ pub fn reduce(frame: &RgbImage) -> RgbImage {
     resize(frame, WIDTH, height, FilterType::Triangle)
 }
 
-/// The page of reduced frames of one size.
-pub fn page(frames: &[RgbImage]) -> RgbImage {
-    page_of(frames, COLUMNS)
+/// The page of reduced frames of one size, each with a label under it.
+pub fn page(frames: &[(RgbImage, String)]) -> RgbImage {
+    let labelled: Vec<RgbImage> = frames.iter().map(|(frame, label)| with_label(frame, label)).collect();
+    page_of(&labelled, COLUMNS)
+}
+
+/// A frame with a line of text under it, cut where the frame ends.
+fn with_label(frame: &RgbImage, label: &str) -> RgbImage {
+    let mut picture = RgbImage::from_pixel(frame.width(), frame.height() + LABEL, BACKGROUND);
+    image::imageops::replace(&mut picture, frame, 0, 0);
+    let top = frame.height() as f32 + 0.5 * (LABEL as f32 - LETTERS);
+    text::draw(&mut picture, [3.0, top], LETTERS, [200; 3], label);
+    picture
 }
 
 /// Pictures of one size in rows of up to `columns`.
@@ -33,8 +49,7 @@ pub fn page_of(frames: &[RgbImage], columns: u32) -> RgbImage {
     let (w, h) = frames.first().map_or((1, 1), RgbImage::dimensions);
     let columns = columns.min(frames.len() as u32).max(1);
     let rows = (frames.len() as u32).div_ceil(columns).max(1);
-    let mut page =
-        RgbImage::from_pixel(columns * (w + GAP) + GAP, rows * (h + GAP) + GAP, image::Rgb([24, 24, 26]));
+    let mut page = RgbImage::from_pixel(columns * (w + GAP) + GAP, rows * (h + GAP) + GAP, BACKGROUND);
     for (i, frame) in frames.iter().enumerate() {
         let (x, y) = (i as u32 % columns, i as u32 / columns);
         let place = |n: u32, step: u32| i64::from(GAP + n * (step + GAP));
@@ -58,9 +73,23 @@ mod tests {
 
     #[test]
     fn a_page_holds_its_frames() {
-        let page = page(&vec![RgbImage::from_pixel(20, 10, image::Rgb([255, 0, 0])); 9]);
+        let page = page_of(&vec![RgbImage::from_pixel(20, 10, image::Rgb([255, 0, 0])); 9], COLUMNS);
         assert_eq!(page.dimensions(), (8 * 24 + 4, 2 * 14 + 4));
         assert_eq!(page.get_pixel(4, 18).0, [255, 0, 0]);
         assert_eq!(page.get_pixel(28, 18).0, [24, 24, 26]);
+    }
+
+    #[test]
+    fn a_label_stands_under_its_frame_and_is_cut_where_the_frame_ends() {
+        let frame = RgbImage::from_pixel(40, 10, image::Rgb([255, 0, 0]));
+        let one = page(&[(frame.clone(), "0001".into())]);
+        assert_eq!(one.dimensions(), (40 + 8, 10 + 18 + 8));
+        let is_letter = |p: &image::Rgb<u8>| p.0.iter().all(|v| *v > 150);
+        let rows: Vec<u32> =
+            one.enumerate_pixels().filter(|(_, _, p)| is_letter(p)).map(|(_, y, _)| y).collect();
+        assert!(!rows.is_empty() && rows.iter().all(|y| (14..32).contains(y)), "{rows:?}");
+        let long = page(&[(frame.clone(), "0001 a long label".into()), (frame, String::new())]);
+        let beside = long.enumerate_pixels().filter(|(x, _, p)| *x >= 44 && is_letter(p)).count();
+        assert_eq!(beside, 0, "the label of one frame does not run into the next");
     }
 }

@@ -4,5 +4,7 @@ pub mod contact_sheet;
 pub mod inset;
 pub mod marks;
 pub mod page;
+pub mod text;
+pub mod timeline;
 pub mod versus;
 pub mod video;

@@ -2,26 +2,48 @@
 //!
 //! ```text
 //! folders of runs --RunFolder--> pairs of frames --measure--> differences
-//!                                     +--page--> DIR/review.html, DIR/a, DIR/b
+//!                                     +--page---> DIR/review.html, DIR/a, DIR/b
+//!                                     +--video--> FILE.mp4
 //! ```
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
+use image::RgbImage;
 use rubor_assets::files;
 
 use super::page::{self, Cost, Curve, PAGE_FILE, PageData, rounded};
+use super::text;
+use super::video::{self, Video};
 use crate::error::{Failure, Outcome};
 use crate::job::Job;
 use crate::measure::difference::Difference;
 use crate::notes::Note;
 use crate::output;
-use crate::run::{JOB_FILE, frame_path};
+use crate::run::{JOB_FILE, frame_path, letters};
 
 /// Folders of the two runs beside their page.
 const FOLDERS: [&str; 2] = ["a", "b"];
 /// Frames per second of a folder that says nothing about them.
 const USUAL_FPS: f64 = 24.0;
+
+/// Seconds in which the line of a wipe goes over the picture and back.
+const WIPE_SECONDS: f64 = 4.0;
+/// Factor of differences in a video, as the page begins with.
+const GAIN: u32 = 4;
+
+/// How two pictures become one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Layout {
+    /// The first left, the second right
+    #[default]
+    SideBySide,
+    /// The first left of a line that goes over the picture and back in four seconds
+    Wipe,
+    /// Four times what they are apart
+    Difference,
+}
 
 /// The folder of a run.
 #[derive(Clone, Debug)]
@@ -62,7 +84,8 @@ impl RunFolder {
                     data.frames.iter().copied().filter(|n| found.binary_search(n).is_err()).collect();
                 if let Some(first) = lacking.first() {
                     let (count, all) = (lacking.len(), data.frames.len());
-                    let message = format!("found no picture of {count} of {all} frames; the first is {first}");
+                    let message =
+                        format!("found no picture of {count} of {all} frames; the first is {first}");
                     notes.push(Note::new(&about, message));
                 }
                 data
@@ -90,8 +113,7 @@ fn frames(folder: &Path) -> Outcome<Vec<u32>> {
         let is_number = digits.len() >= 4 && digits.bytes().all(|b| b.is_ascii_digit());
         digits.parse().ok().filter(|n| is_number && *n > 0)
     };
-    let mut numbers: Vec<u32> =
-        entries.filter_map(|e| number(e.ok()?.file_name().to_str()?)).collect();
+    let mut numbers: Vec<u32> = entries.filter_map(|e| number(e.ok()?.file_name().to_str()?)).collect();
     numbers.sort_unstable();
     numbers.dedup();
     Ok(numbers)
@@ -235,4 +257,152 @@ fn link(from: &Path, to: &Path) -> Outcome {
     }
     let bytes = std::fs::read(from).map_err(|e| Failure::read(from, e))?;
     files::replace(to, &bytes).map_err(|e| Failure::write(to, e))
+}
+
+/// Encodes the frames that both runs have, with their names and numbers. Both are pictures of one size.
+///
+/// # Errors
+/// Sizes that differ; no pair; a picture that cannot be read; the encoder fails.
+pub fn video(first: &RunFolder, second: &RunFolder, layout: Layout, path: &Path) -> Outcome<Video> {
+    let (size, other) = (first.data.size, second.data.size);
+    if size != other {
+        return Err(Failure::input(format!(
+            "{}: found {}x{} pixels, expected {}x{} as in {}: a video needs one size",
+            second.folder.display(),
+            other[0],
+            other[1],
+            size[0],
+            size[1],
+            first.folder.display()
+        )));
+    }
+    let pairs = pairs(&first.data, &second.data);
+    if pairs.is_empty() {
+        let found = format!("found no frames that belong to those of {}", first.folder.display());
+        return Err(Failure::input(format!("{}: {found}", second.folder.display())));
+    }
+    let read = |run: &RunFolder, number: u32| -> Outcome<RgbImage> {
+        let path = run.picture(number);
+        Ok(image::open(&path).map_err(|e| Failure::read(&path, e))?.into_rgb8())
+    };
+    let pictures = pairs.iter().map(|pair| {
+        let (a, b) = (read(first, pair.first)?, read(second, pair.second)?);
+        for (run, picture) in [(first, &a), (second, &b)] {
+            if picture.dimensions() != (size[0], size[1]) {
+                let (width, height) = picture.dimensions();
+                let found = format!("found a frame of {width}x{height} pixels");
+                let expected = format!("expected {}x{}", size[0], size[1]);
+                return Err(Failure::input(format!("{}: {found}, {expected}", run.folder.display())));
+            }
+        }
+        let time_s = f64::from(pair.first - 1) / first.data.fps;
+        let names = [&first.data.title, &second.data.title].map(String::as_str);
+        Ok(beside(&a, &b, layout, time_s, names, pair.first))
+    });
+    let wide = if layout == Layout::SideBySide { 2 * size[0] } else { size[0] };
+    video::encode(path, [wide, size[1]], first.data.fps, pictures)
+}
+
+/// Two pictures of one size as one.
+fn beside(
+    a: &RgbImage,
+    b: &RgbImage,
+    layout: Layout,
+    time_s: f64,
+    [a_name, b_name]: [&str; 2],
+    number: u32,
+) -> RgbImage {
+    let (width, height) = a.dimensions();
+    let letters = letters(height);
+    let right = |text: &str, edge: u32| edge as f32 - text::width(text, letters) - letters;
+    let frame = format!("{number:04}");
+    let mut picture = a.clone();
+    match layout {
+        Layout::SideBySide => {
+            picture = RgbImage::new(2 * width, height);
+            image::imageops::replace(&mut picture, a, 0, 0);
+            image::imageops::replace(&mut picture, b, i64::from(width), 0);
+            text::draw_on_picture(&mut picture, [letters; 2], letters, a_name);
+            text::draw_on_picture(&mut picture, [width as f32 + letters, letters], letters, b_name);
+            text::draw_on_picture(&mut picture, [right(&frame, 2 * width), letters], letters, &frame);
+        }
+        Layout::Wipe => {
+            // A triangle wave between the sides.
+            let turn = (time_s / WIPE_SECONDS).fract();
+            let share = 1.0 - (2.0 * turn - 1.0).abs();
+            let line = ((share * f64::from(width)).round() as u32).min(width);
+            for (x, y, pixel) in picture.enumerate_pixels_mut() {
+                if x >= line {
+                    *pixel = *b.get_pixel(x, y);
+                }
+                if x == line {
+                    *pixel = image::Rgb([255; 3]);
+                }
+            }
+            text::draw_on_picture(&mut picture, [letters; 2], letters, a_name);
+            text::draw_on_picture(&mut picture, [right(b_name, width), letters], letters, b_name);
+            let at = [letters, height as f32 - 2.0 * letters];
+            text::draw_on_picture(&mut picture, at, letters, &frame);
+        }
+        Layout::Difference => {
+            for (pixel, other) in picture.pixels_mut().zip(b.pixels()) {
+                for (value, other) in pixel.0.iter_mut().zip(other.0) {
+                    *value = (u32::from(value.abs_diff(other)) * GAIN).min(255) as u8;
+                }
+            }
+            let words = format!("{frame}  {a_name} - {b_name}  x{GAIN}");
+            text::draw_on_picture(&mut picture, [letters; 2], letters, &words);
+        }
+    }
+    picture
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_stand_beside_each_other_or_share_one() {
+        let [a, b] = [[200, 10, 10], [10, 10, 210]].map(|c| RgbImage::from_pixel(200, 60, image::Rgb(c)));
+        let at = |layout, time_s| beside(&a, &b, layout, time_s, ["a", "b"], 7);
+        let both = at(Layout::SideBySide, 0.0);
+        assert_eq!(both.dimensions(), (400, 60));
+        assert_eq!((both.get_pixel(100, 40).0, both.get_pixel(300, 40).0), ([200, 10, 10], [10, 10, 210]));
+        // A quarter of the way there and back: the line is in the middle, twice.
+        for time_s in [1.0, 3.0] {
+            let wipe = at(Layout::Wipe, time_s);
+            let pixel = |x| wipe.get_pixel(x, 30).0;
+            assert_eq!([pixel(90), pixel(100), pixel(110)], [[200, 10, 10], [255; 3], [10, 10, 210]]);
+        }
+        assert_eq!(at(Layout::Wipe, 2.0).get_pixel(199, 40).0, [200, 10, 10], "the line is beyond the edge");
+        assert_eq!(at(Layout::Difference, 0.0).get_pixel(150, 40).0, [255, 0, 255]);
+    }
+
+    #[test]
+    fn frames_are_paired_by_number_or_by_time() {
+        let run = |fps: f64, frames: Vec<u32>| PageData {
+            id: String::new(),
+            title: String::new(),
+            folder: String::new(),
+            fps,
+            size: [1, 1],
+            frames,
+            curves: Vec::new(),
+            marks: Vec::new(),
+            inset: None,
+            settings: Vec::new(),
+            facts: Vec::new(),
+            cost: Cost::default(),
+            notes: Vec::new(),
+            files: Vec::new(),
+            second: None,
+        };
+        let of = |a: &PageData, b: &PageData| -> Vec<[u32; 2]> {
+            pairs(a, b).iter().map(|pair| [pair.first, pair.second]).collect()
+        };
+        let slow = run(12.0, vec![1, 2, 3, 5]);
+        assert_eq!(of(&slow, &run(12.0, vec![2, 3, 4])), [[2, 2], [3, 3]]);
+        assert_eq!(of(&slow, &run(24.0, (1..=6).collect())), [[1, 1], [2, 3], [3, 5]]);
+        assert_eq!(of(&run(24.0, vec![1, 2, 3]), &slow), [[1, 1], [2, 1], [3, 2]]);
+    }
 }

@@ -235,8 +235,7 @@ fn curves(plan: &Plan<'_>, frames: &[u32]) -> Vec<Curve> {
     let mut states: Vec<_> =
         rig.state_names().map(|name| with_keys("states", name, &sequence.states)).collect();
     let mut scale = curve("blood", "amount of blood", 1.0);
-    let mut blood: Vec<_> =
-        head.maps.distributions.iter().map(|d| curve("blood", &d.name, 0.0)).collect();
+    let mut blood: Vec<_> = head.maps.distributions.iter().map(|d| curve("blood", &d.name, 0.0)).collect();
     let mut wrinkles: Vec<_> = head.maps.zones.iter().map(|z| curve("wrinkles", &z.name, 0.0)).collect();
     let mut shapes: Vec<_> =
         head.shapes.iter().map(|s| with_keys("shapes", &s.name, &sequence.shapes)).collect();
@@ -359,7 +358,9 @@ mod tests {
     fn what_is_no_page_is_said() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.html");
-        for (text, found) in [("<html>", "no data"), (&format!("{DATA_START}{{}}{DATA_END}")[..], "other data")] {
+        for (text, found) in
+            [("<html>", "no data"), (&format!("{DATA_START}{{}}{DATA_END}")[..], "other data")]
+        {
             std::fs::write(&path, text).unwrap();
             let message = PageData::read(&path).unwrap_err().to_string();
             assert!(message.contains(found) && message.contains("--resume"), "{message}");
@@ -368,7 +369,8 @@ mod tests {
 
     #[test]
     fn costs_stand_at_their_frames_and_passes_that_run_twice_are_summed() {
-        let measured = FrameCost { seconds: 0.5, passes_ms: vec![("shade", 1.0), ("morph", 0.25), ("shade", 2.0)] };
+        let measured =
+            FrameCost { seconds: 0.5, passes_ms: vec![("shade", 1.0), ("morph", 0.25), ("shade", 2.0)] };
         let cost = cost(&[0, 3, 4], &BTreeMap::from([(3, measured)]));
         assert_eq!(cost.seconds, [None, Some(0.5), None]);
         assert_eq!(cost.passes["shade"], [None, Some(3.0), None]);
