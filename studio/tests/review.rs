@@ -36,12 +36,13 @@ fn sequence(folder: &Path, frames: u32) -> PathBuf {
     path
 }
 
-const FAST: &[&str] = &["--size", "48x32", "--preset", "draft", "--shadow-size", "64", "--no-export"];
+const FAST: &[&str] = &["--preset", "draft", "--shadow-size", "64", "--no-export"];
 
 fn render(sequence: &Path, out: &Path, more: &[&str]) -> String {
     let quiet: &[&str] = if more.contains(&"--burn-in") { &[] } else { &["--no-video"] };
+    let size: &[&str] = if more.contains(&"--size") { &[] } else { &["--size", "48x32"] };
     let command = ["render", "--sequence", text(sequence), "-o", text(out)];
-    done(&rubor(&[&command[..], FAST, quiet, more].concat()))
+    done(&rubor(&[&command[..], FAST, size, quiet, more].concat()))
 }
 
 #[test]
