@@ -128,10 +128,10 @@ review() {
   mkdir -p "$out/node"
   cp "$here/package.json" "$out/node/"
   (cd "$out/node" && npm install --silent --no-fund --no-audit) || return 1
-  draw="$rubor render --preset draft --no-export --fps 4 --resume ${RUBOR_ADAPTER:+--adapter $RUBOR_ADAPTER}"
-  $draw --size 192x192 --inset hemoglobin --format exr --antialias ssaa:2 --burn-in -o "$out/review-a" || return 1
-  $draw --size 192x192 --inset hemoglobin --no-video --exposure 2.4 --scatter none -o "$out/review-b" || return 1
-  $draw --size 128x96 --no-video --frames 1-12 -o "$out/review-c" || return 1
+  draw="$rubor render --sequence $here/review.json --preset draft --no-export --resume ${RUBOR_ADAPTER:+--adapter $RUBOR_ADAPTER}"
+  $draw --size 160x160 --inset hemoglobin --format exr --burn-in -o "$out/review-a" || return 1
+  $draw --size 160x160 --inset hemoglobin --no-video --exposure 2.4 --scatter none -o "$out/review-b" || return 1
+  $draw --size 96x64 --no-video --frames 1-10 -o "$out/review-c" || return 1
   "$rubor" compare "$out/review-a" "$out/review-b" --page "$out/review-page" >/dev/null || return 1
   (cd "$out/node" && node "$here/review.mjs" "$out/review-a" "$out/review-page" "$out/review-c" "$out/review-pictures") || failed=1
   python=$(python_with OpenEXR "${REVIEW_PYTHON:-}" opentimelineio otio-cmx3600-adapter)
