@@ -80,10 +80,13 @@ pub fn write(path: &Path, channels: &[ChannelData], about: &About) -> Outcome {
         layers(data, about, &mut all);
     }
     let text = |text: &str| Text::new_or_panic(text);
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Some(text(concat!("rubor ", env!("CARGO_PKG_VERSION"))));
-    attributes.frames_per_second = rational(about.fps);
-    attributes.other.insert(text("imageCounter"), AttributeValue::I32(about.number as i32));
+    let counter = (text("imageCounter"), AttributeValue::I32(about.number as i32));
+    let attributes = LayerAttributes {
+        software_name: Some(text(concat!("rubor ", env!("CARGO_PKG_VERSION")))),
+        frames_per_second: rational(about.fps),
+        other: [counter].into_iter().collect(),
+        ..LayerAttributes::default()
+    };
     let layer = Layer::new(
         (width, height),
         attributes,
@@ -161,7 +164,8 @@ fn layers(data: &ChannelData, about: &About, all: &mut Vec<AnyChannel<FlatSample
             for material in Material::ALL.into_iter().filter(|material| material.is_opaque()) {
                 let number = material.number() + 1;
                 let covered = |texel: &[f32]| f32::from(u8::from(texel[0].to_bits() == number));
-                let name = format!("mask.{}", format!("{material:?}").to_lowercase());
+                let material = format!("{material:?}").to_lowercase();
+                let name = format!("mask.{material}");
                 all.push(halves(&name, &means(data, about.size, covered)));
             }
             all.push(AnyChannel::new("id.part", FlatSamples::U32(parts)));

@@ -184,9 +184,9 @@ pub fn run(
     watch.notes(&of_surroundings);
     notes.extend(of_surroundings);
     let mut files = vec![PathBuf::from(SHEET_FILE)];
-    let label = |place: usize| plan.frames().get(place).map(|frame| moment(plan, *frame)).unwrap_or_default();
-    let small: Vec<(RgbImage, String)> =
-        sheet.into_iter().map(|(place, small)| (small, label(place))).collect();
+    let words = |place: usize| plan.frames().get(place).map(|frame| moment(plan, *frame)).unwrap_or_default();
+    let small: Vec<(RgbImage, Vec<String>)> =
+        sheet.into_iter().map(|(place, small)| (small, words(place))).collect();
     output::save_picture(&to.folder.join(SHEET_FILE), &contact_sheet::page(&small))?;
     // A video that fails costs neither the head nor the report.
     let mut failed = None;
@@ -364,11 +364,11 @@ fn save_channels(job: &Job, folder: &Path, frame: u32, drawn: &Frame) -> Outcome
     layers::write(&layers_path(folder, frame), &drawn.channels, &about)
 }
 
-/// A frame in words: its number, its time, and the expressions and states that show, the strongest first.
-fn moment(plan: &Plan<'_>, frame: u32) -> String {
+/// A frame in words: its number and time, then the expressions and states that show, the strongest first.
+fn moment(plan: &Plan<'_>, frame: u32) -> Vec<String> {
     // Weights under this do not show.
     const LEAST: f32 = 0.05;
-    let Some(evaluator) = plan.evaluator() else { return String::new() };
+    let Some(evaluator) = plan.evaluator() else { return Vec::new() };
     let time_s = evaluator.frame_time_s(frame);
     let (rig, weights) = (evaluator.rig(), evaluator.weights_at(time_s));
     let expressions = rig.expression_names().zip(&weights.expressions);
@@ -378,8 +378,9 @@ fn moment(plan: &Plan<'_>, frame: u32) -> String {
         .filter(|(_, weight)| *weight >= LEAST)
         .collect();
     shown.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let shown: String = shown.iter().map(|(name, weight)| format!("  {name} {weight:.2}")).collect();
-    format!("{:04}  {time_s:.2} s{shown}", frame + 1)
+    let mut words = vec![format!("{:04}  {time_s:.2} s", frame + 1)];
+    words.extend(shown.iter().map(|(name, weight)| format!("{name} {weight:.2}")));
+    words
 }
 
 /// Encodes the frames.
@@ -389,7 +390,10 @@ fn make_video(plan: &Plan<'_>, to: &Destination) -> Outcome<video::Video> {
         let mut picture = image::open(&path).map_err(|e| Failure::read(&path, e))?.into_rgb8();
         if to.burn_in {
             let height = letters(picture.height());
-            text::draw_on_picture(&mut picture, [height; 2], height, &moment(plan, *frame));
+            for (line, words) in moment(plan, *frame).iter().enumerate() {
+                let top = height * (1.0 + 1.8 * line as f32);
+                text::draw_on_picture(&mut picture, [height, top], height, words);
+            }
         }
         Ok(picture)
     });

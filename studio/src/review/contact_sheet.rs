@@ -15,6 +15,7 @@ const GAP: u32 = 4;
 /// Height of the line under a frame, and of its capitals, pixels.
 const LABEL: u32 = 18;
 const LETTERS: f32 = 8.0;
+const MARGIN: f32 = 3.0;
 const BACKGROUND: image::Rgb<u8> = image::Rgb([24, 24, 26]);
 
 /// Indices of the frames, of `count`, that the page shows, ascending.
@@ -30,18 +31,29 @@ pub fn reduce(frame: &RgbImage) -> RgbImage {
 }
 
 /// The page of reduced frames of one size, each with a label under it.
-pub fn page(frames: &[(RgbImage, String)]) -> RgbImage {
-    let labelled: Vec<RgbImage> = frames.iter().map(|(frame, label)| with_label(frame, label)).collect();
+pub fn page(frames: &[(RgbImage, Vec<String>)]) -> RgbImage {
+    let labelled: Vec<RgbImage> = frames.iter().map(|(frame, words)| with_label(frame, words)).collect();
     page_of(&labelled, COLUMNS)
 }
 
-/// A frame with a line of text under it, cut where the frame ends.
-fn with_label(frame: &RgbImage, label: &str) -> RgbImage {
+/// A frame with words under it.
+fn with_label(frame: &RgbImage, words: &[String]) -> RgbImage {
     let mut picture = RgbImage::from_pixel(frame.width(), frame.height() + LABEL, BACKGROUND);
     image::imageops::replace(&mut picture, frame, 0, 0);
     let top = frame.height() as f32 + 0.5 * (LABEL as f32 - LETTERS);
-    text::draw(&mut picture, [3.0, top], LETTERS, [200; 3], label);
+    text::draw(&mut picture, [MARGIN, top], LETTERS, [200; 3], &label(words, frame.width()));
     picture
+}
+
+/// As many of the words as a width has room for, and how many more there are.
+fn label(words: &[String], width: u32) -> String {
+    let join = |n: usize| {
+        let more = words.len() - n;
+        let rest = if more > 0 && n > 0 { format!("  +{more}") } else { String::new() };
+        format!("{}{rest}", words[..n].join("  "))
+    };
+    let fits = |text: &String| text::width(text, LETTERS) <= width as f32 - 2.0 * MARGIN;
+    (0..=words.len()).rev().map(join).find(fits).unwrap_or_default()
 }
 
 /// Pictures of one size in rows of up to `columns`.
@@ -80,16 +92,17 @@ mod tests {
     }
 
     #[test]
-    fn a_label_stands_under_its_frame_and_is_cut_where_the_frame_ends() {
-        let frame = RgbImage::from_pixel(40, 10, image::Rgb([255, 0, 0]));
-        let one = page(&[(frame.clone(), "0001".into())]);
-        assert_eq!(one.dimensions(), (40 + 8, 10 + 18 + 8));
+    fn a_label_stands_under_its_frame_and_says_what_it_has_no_room_for() {
+        let frame = RgbImage::from_pixel(100, 10, image::Rgb([255, 0, 0]));
+        let words = ["0001  0.00 s", "joy 1.00", "blush 0.50"].map(str::to_owned);
+        let one = page(&[(frame, words[..1].to_vec())]);
+        assert_eq!(one.dimensions(), (100 + 8, 10 + 18 + 8));
         let is_letter = |p: &image::Rgb<u8>| p.0.iter().all(|v| *v > 150);
-        let rows: Vec<u32> =
-            one.enumerate_pixels().filter(|(_, _, p)| is_letter(p)).map(|(_, y, _)| y).collect();
-        assert!(!rows.is_empty() && rows.iter().all(|y| (14..32).contains(y)), "{rows:?}");
-        let long = page(&[(frame.clone(), "0001 a long label".into()), (frame, String::new())]);
-        let beside = long.enumerate_pixels().filter(|(x, _, p)| *x >= 44 && is_letter(p)).count();
-        assert_eq!(beside, 0, "the label of one frame does not run into the next");
+        assert!(one.pixels().any(is_letter));
+        assert!(one.enumerate_pixels().all(|(_, y, p)| !is_letter(p) || (14..32).contains(&y)));
+        assert_eq!(label(&words, 1000), "0001  0.00 s  joy 1.00  blush 0.50");
+        assert_eq!(label(&words, 200), "0001  0.00 s  joy 1.00  +1");
+        assert_eq!(label(&words, 130), "0001  0.00 s  +2");
+        assert_eq!(label(&words, 20), "");
     }
 }

@@ -129,8 +129,10 @@ const baseName = () => data.title.replace(/[^\p{L}\p{N}._-]+/gu, "_") || "review
 on("export", () => { download(`${JSON.stringify(notesFile(), null, 1)}\n`, `${baseName()}.notes.json`, "application/json"); say(`${notes.length} notes exported.`); });
 on("edl", () => {
   download(editList(), `${baseName()}.edl`, "text/plain");
-  const whole = Number.isInteger(data.fps) ? "" : ` Timecodes count ${Math.max(1, Math.round(data.fps))} frames a second, the run has ${data.fps}.`;
-  say(`${notes.length} markers exported.${whole}`);
+  const base = Math.max(1, Math.round(data.fps));
+  const counts = base === data.fps ? "" : ` Timecodes count ${base} frames a second, the run has ${data.fps}.`;
+  const rare = [24, 25, 30, 48, 50, 60].includes(base) ? "" : ` Not every program reads timecodes of ${base} frames a second.`;
+  say(`${notes.length} markers exported.${counts}${rare}`);
 });
 on("import", () => $("notes-file").click());
 $("notes-file").addEventListener("change", async () => {
