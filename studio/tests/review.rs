@@ -159,6 +159,9 @@ fn two_runs_share_a_page_and_what_is_unlike_is_said() {
     assert!(!at("page/b/frame.0003.png").exists());
     assert!(at("page/b/frame.0002.png").exists());
 
+    let own = rubor(&["compare", text(&at("one")), text(&at("two")), "--page", text(&at("one"))]);
+    assert_eq!(own.status.code(), Some(2), "the page of a run is not replaced");
+
     // A lost frame and a broken one do not hide the others.
     std::fs::remove_file(at("two/frame.0001.png")).expect("a frame");
     std::fs::write(at("two/frame.0002.png"), b"half").expect("a frame");

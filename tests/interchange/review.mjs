@@ -204,7 +204,7 @@ try {
   expect((await page.locator("#panel-frame figure canvas").count()) === 1, "no inset");
   expect(/drawn in\s*[\d.]+ s/.test(await page.textContent("#panel-frame")), "no time of the frame");
   await press(page, "ArrowRight");
-  expect((await page.textContent("#panel-run")).includes("quality.scatter"), "no settings");
+  expect((await page.textContent("#panel-run")).replaceAll("\u200b", "").includes("quality.scatter"), "no settings");
   const links = await page.$$eval("#panel-run a", (all) => all.map((a) => a.getAttribute("href")));
   for (const link of links) expect(existsSync(join(run, decodeURI(link))), `the link ${link} leads nowhere`);
   // Everything by the tabulator.

@@ -205,13 +205,21 @@ pub fn unlike(first: &RunFolder, second: &RunFolder) -> Vec<Note> {
 /// frames of the first run.
 ///
 /// # Errors
-/// The system reports an error.
+/// The folder is that of a run; the system reports an error.
 pub fn page(
     first: &RunFolder,
     second: &RunFolder,
     differences: &BTreeMap<u32, Difference>,
     to: &Path,
 ) -> Outcome<PathBuf> {
+    let place = |path: &Path| path.canonicalize().ok();
+    if let Some(run) =
+        [first, second].into_iter().find(|run| place(to).is_some_and(|p| place(&run.folder) == Some(p)))
+    {
+        let found =
+            format!("{}: found the folder of a run, whose page it would replace", run.folder.display());
+        return Err(Failure::input(format!("{found}, expected another one")));
+    }
     let mut data = [first, second].map(|run| run.data.clone());
     for ((run, data), name) in [first, second].into_iter().zip(&mut data).zip(FOLDERS) {
         let folder = to.join(name);

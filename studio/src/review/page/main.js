@@ -23,11 +23,15 @@ for (const [k, tab] of TABS.entries()) {
   });
 }
 
-function table(rows) {
+/** A row for each name with its values; numbers are aligned. `marks`: rows whose values differ are marked. */
+function table(rows, marks = false) {
+  // Long names may break between their words.
+  const breakable = (name) => name.replace(/\./g, ".\u200b").replace(/([a-z])([A-Z])/g, "$1\u200b$2");
   return element("table", {}, element("tbody", {}, ...rows.map(([name, ...values]) => {
-    const differs = values.length > 1 && values.some((v) => v !== values[0]);
-    const cells = values.map((v) => element("td", { class: typeof v === "number" ? "number" : null }, typeof v === "number" ? String(Math.round(v * 1000) / 1000) : v ?? "–"));
-    return element("tr", { class: differs ? "differs" : null }, element("th", { scope: "row" }, name), ...cells);
+    const differs = marks && values.some((v) => v !== values[0]);
+    const isNumber = values.some((v) => typeof v === "number");
+    const cells = values.map((v) => element("td", { class: isNumber ? "number" : null }, typeof v === "number" ? v.toFixed(3) : v ?? "–"));
+    return element("tr", { class: differs ? "differs" : null }, element("th", { scope: "row" }, breakable(name)), ...cells);
   })));
 }
 
@@ -66,7 +70,7 @@ function showFrame() {
     const sum = both((of, at) => passes.reduce((total, name) => total + (cost(of, at, name) ?? 0), 0));
     parts.push(titled("Milliseconds on the device", table([...rows, ["all", ...sum]])));
   }
-  const moving = data.curves.filter((curve) => moves(curve, curve.values[place]));
+  const moving = data.curves.filter((curve) => curve.group !== "difference" && moves(curve, curve.values[place]));
   parts.push(titled(`Weights that are not at rest (${moving.length})`, table(moving.map((curve) => [
     curve.name, ...both((of, at) => (of.curves.find((c) => c.group === curve.group && c.name === curve.name) ?? curve).values[at]),
   ]))));
@@ -80,7 +84,7 @@ function showRun() {
   if (second) parts.push(titled("Runs", table([["A", data.title], ["B", second.of.title]]), element("p", {}, "Settings that differ are marked.")));
   const names = [...new Set(runs.flatMap((of) => of.settings.map(([name]) => name)))];
   const setting = (of, name) => of.settings.find(([n]) => n === name)?.[1] ?? "unknown";
-  parts.push(titled("Settings", table(names.map((name) => [name, ...runs.map((of) => setting(of, name))]))));
+  parts.push(titled("Settings", table(names.map((name) => [name, ...runs.map((of) => setting(of, name))]), true)));
   const facts = [...new Set(runs.flatMap((of) => of.facts.map(([name]) => name)))];
   parts.push(titled("Measured", table(facts.map((name) => [name, ...runs.map((of) => of.facts.find(([n]) => n === name)?.[1] ?? "–")]))));
   if (data.notes.length > 0) parts.push(titled("Remarks", element("ul", { class: "plain" }, ...data.notes.map((note) => element("li", {}, note)))));
@@ -146,7 +150,9 @@ const THEMES = ["system", "light", "dark"];
 function setTheme(theme) {
   if (theme === "system") delete document.documentElement.dataset.theme;
   else document.documentElement.dataset.theme = theme;
-  $("theme").textContent = `Theme: ${theme}`;
+  const name = theme[0].toUpperCase() + theme.slice(1);
+  $("theme").textContent = `◐ ${name}`;
+  $("theme").setAttribute("aria-label", `Theme: ${name}`);
   try { localStorage.setItem("rubor-review:theme", theme); } catch { /* It is chosen again next time. */ }
   refresh();
 }

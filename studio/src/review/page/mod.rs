@@ -15,6 +15,7 @@ use rubor_renderer::settings::{Settings, leaves};
 use rubor_rig::limits;
 use rubor_rig::timeline::Track;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::inset::{self, Inset};
 use super::marks::{self, Mark};
@@ -271,8 +272,19 @@ fn inset_place(map: inset::Map, rect: [u32; 4]) -> InsetPlace {
 }
 
 fn settings(settings: &Settings) -> Vec<(String, String)> {
+    fn text(value: &Value) -> String {
+        match value {
+            Value::String(text) => text.clone(),
+            // Settings are f32: 1.8, not 1.7999999523162842.
+            Value::Number(number) if number.is_f64() => {
+                number.as_f64().map_or_else(String::new, |v| (v as f32).to_string())
+            }
+            Value::Array(list) if list.is_empty() => "none".into(),
+            Value::Array(list) => list.iter().map(text).collect::<Vec<_>>().join(", "),
+            other => other.to_string(),
+        }
+    }
     let value = serde_json::to_value(settings).unwrap_or_default();
-    let text = |value: &serde_json::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     leaves().iter().map(|leaf| (leaf.name(), text(&value[&leaf.path[0]][&leaf.path[1]]))).collect()
 }
 

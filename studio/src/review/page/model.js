@@ -22,7 +22,7 @@ let spoken;
 function say(text) {
   $("status").textContent = text;
   clearTimeout(spoken);
-  spoken = setTimeout(() => { $("status").textContent = ""; }, 2500 + 50 * text.length);
+  spoken = setTimeout(() => { $("status").textContent = ""; }, 2000 + 35 * text.length);
 }
 
 /** Hours, minutes, seconds and frames of a frame, counted from 0, at the whole rate nearest to `fps`. */

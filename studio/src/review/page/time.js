@@ -172,7 +172,7 @@ scrubs($("track"), () => $("track"));
 scrubs($("lanes"), (event) => event.target.closest(".lane")?.querySelector(".plot"));
 
 // Curves: a row for each that moves, by group.
-const GROUPS = [["expressions", "Expressions"], ["states", "States"], ["blood", "Blood"], ["wrinkles", "Wrinkles"], ["shapes", "Shapes"], ["difference", "Difference"]];
+const GROUPS = [["difference", "Difference"], ["expressions", "Expressions"], ["states", "States"], ["blood", "Blood"], ["wrinkles", "Wrinkles"], ["shapes", "Shapes"]];
 const hidden = new Set(["shapes"]);
 let lanes = [];
 
