@@ -211,7 +211,8 @@ mod tests {
         let pictures: BTreeSet<Vec<u8>> =
             all.iter().map(|c| drawn(&c.to_string(), 12.0).into_raw()).collect();
         assert_eq!(pictures.len(), all.len());
-        assert!(pictures.iter().all(|bytes| bytes.iter().any(|b| *b > 200)), "each has a full line");
+        // A dot between four pixels covers each of them by little more than half.
+        assert!(pictures.iter().all(|bytes| bytes.iter().any(|b| *b > 120)), "each is seen");
         assert!(!all.iter().any(|c| strokes(*c) == BOX));
         assert_eq!(drawn("\u{e9}", 12.0), drawn("\u{416}", 12.0));
         for letter in all {
