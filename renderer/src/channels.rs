@@ -39,9 +39,16 @@ pub enum Channel {
     Depth,
     /// Head in the upper 5 bits, triangle plus one in the lower 27; 0 for the background.
     Ids,
-    /// Motion since the previous frame, x right, y down, without jitter; only where antialiasing uses the previous
-    /// frame.
+    /// Motion since the previous frame, x right, y down, without jitter; 0 where the renderer drew no frame before.
     Velocity,
+    /// Normal of the surface, without the relief of skin; it faces the camera.
+    Normal,
+    /// Melanin of skin with maps, share of the volume of the epidermis; 0 elsewhere.
+    Melanin,
+    /// Hemoglobin of skin with maps as it is in this frame, share of the volume of the dermis; 0 elsewhere.
+    Hemoglobin,
+    /// Number of the material plus one, in the order of `rubor_rig::head::Material::ALL`; 0 for the background.
+    Parts,
     /// Deformed points.
     Positions,
     /// Ambient visibility of each point.
@@ -77,6 +84,10 @@ pub const CHANNELS: &[ChannelRow] = &[
     row(Channel::Depth, Extent::Pixels, &["Z"], "near plane / distance", "view"),
     row(Channel::Ids, Extent::Pixels, &["id"], "bits", "none"),
     row(Channel::Velocity, Extent::Pixels, &["X", "Y"], "pixels", "picture"),
+    row(Channel::Normal, Extent::Pixels, &["X", "Y", "Z"], "unit vectors", "world"),
+    row(Channel::Melanin, Extent::Pixels, &["Y"], "share of the volume", "none"),
+    row(Channel::Hemoglobin, Extent::Pixels, &["Y"], "share of the volume", "none"),
+    row(Channel::Parts, Extent::Pixels, &["id"], "bits", "none"),
     row(Channel::Positions, Extent::Points, &["X", "Y", "Z"], "metres", "world"),
     row(Channel::Visibility, Extent::Points, &["V"], "share of the sky", "none"),
     row(
@@ -106,6 +117,11 @@ impl Channel {
             i += 1;
         }
         &CHANNELS[i]
+    }
+
+    /// Whether its values are bits of whole numbers.
+    pub fn is_whole(self) -> bool {
+        self.row().unit == "bits"
     }
 
     /// Name in arguments and files.

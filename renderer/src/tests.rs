@@ -10,7 +10,7 @@ use rubor_rig::map::Map;
 
 use crate::channels::{CHANNELS, Channel, ChannelData};
 use crate::device::native;
-use crate::passes::geometry::{morph, shadow, tangent_frames, velocity, visibility};
+use crate::passes::geometry::{morph, shadow, surface_data, tangent_frames, velocity, visibility};
 use crate::passes::hair::overlay;
 use crate::passes::{appearance, compose, display, resolve, see_through, shade};
 use crate::scene::authored::{GpuAuthoredVertex, GpuMaterial, GpuTexture};
@@ -48,6 +48,7 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
         assert_workgroups(&resolve::program(tone_map), &square("resolve_samples"));
     }
     assert_workgroups(&velocity::program(), &square("screen_velocity"));
+    assert_workgroups(&surface_data::program(), &square("surface_data"));
     for numbered in [true, false] {
         assert_raster(&visibility::program(numbered), &visibility::entries(numbered));
     }
@@ -593,17 +594,25 @@ fn velocity_is_the_motion_of_the_point_that_a_pixel_sees() {
     let Some(mut renderer) = renderer() else { return };
     let head = dome();
     let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    // Also where the picture itself needs no motion.
+    for method in [AntialiasMethod::SmaaT2x, AntialiasMethod::None, AntialiasMethod::Smaa1x] {
+        velocity_is_the_motion(&mut renderer, &head, &on_gpu, method);
+    }
+}
+
+fn velocity_is_the_motion(renderer: &mut Renderer, head: &Head, on_gpu: &HeadOnGpu, method: AntialiasMethod) {
     let size = 40;
     let mut settings = settings([size; 2]);
-    settings.quality.antialias = AntialiasMethod::SmaaT2x;
+    settings.quality.antialias = method;
+    renderer.cut(0);
     let cameras = [CAMERA, Camera { position: Vec3::new(0.02, 0.01, 0.49), ..CAMERA }];
-    let mut states = [FaceState::neutral(&head), FaceState::neutral(&head)];
+    let mut states = [FaceState::neutral(head), FaceState::neutral(head)];
     states[1].shapes = vec![0.6, 0.2];
     states[1].head_rotation = Quat::from_rotation_y(0.05);
     let mut points = Vec::new();
     for (camera, state) in cameras.into_iter().zip(&states) {
         let scene = Scene {
-            heads: &[HeadInstance { head: &on_gpu, state, world_from_head: Mat4::IDENTITY }],
+            heads: &[HeadInstance { head: on_gpu, state, world_from_head: Mat4::IDENTITY }],
             camera,
             lights: &[],
             environment: None,
@@ -611,11 +620,11 @@ fn velocity_is_the_motion_of_the_point_that_a_pixel_sees() {
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
         };
-        render(&mut renderer, &scene, &settings).expect("it draws");
-        points.push(read_vectors(&renderer, Channel::Positions));
+        render(renderer, &scene, &settings).expect("it draws");
+        points.push(read_vectors(renderer, Channel::Positions));
     }
-    let ids: Vec<[f32; 1]> = read(&renderer, Channel::Ids).texels().collect();
-    let velocity: Vec<[f32; 2]> = read(&renderer, Channel::Velocity).texels().collect();
+    let ids: Vec<[f32; 1]> = read(renderer, Channel::Ids).texels().collect();
+    let velocity: Vec<[f32; 2]> = read(renderer, Channel::Velocity).texels().collect();
     let place = |camera: &Camera, p: DVec3| {
         let clip_from_world = (camera.clip_from_view(1.0) * camera.view_from_world()).as_dmat4();
         let clip = clip_from_world * p.extend(1.0);
@@ -626,7 +635,7 @@ fn velocity_is_the_motion_of_the_point_that_a_pixel_sees() {
     let (mut compared, mut fastest) = (0, 0.0f64);
     for (i, found) in velocity.iter().enumerate() {
         let id = ids[i][0].to_bits();
-        let Some(hit) = seen_surface(&head, &points[1], id, &cameras[1], size, i as u32, offset_px) else {
+        let Some(hit) = seen_surface(head, &points[1], id, &cameras[1], size, i as u32, offset_px) else {
             assert_eq!(*found, [0.0, 0.0], "the background does not move");
             continue;
         };

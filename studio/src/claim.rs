@@ -20,8 +20,11 @@ use rubor_renderer::channels::CHANNELS;
 
 use crate::error::{Failure, Outcome};
 use crate::job::{FrameList, Job};
+use crate::manifest::MANIFEST_FILE;
 use crate::notes::Note;
 use crate::output;
+use crate::review::page::PAGE_FILE;
+use crate::review::timeline::TIMELINE_FILE;
 use crate::run::{HEAD_FILE, JOB_FILE, SHEET_FILE, STATS_FILE, VIDEO_FILE};
 
 /// Name of the lock; the file is there while a run works in the folder.
@@ -36,6 +39,8 @@ pub(crate) struct Claim<'a> {
     pub(crate) is_new: bool,
     /// The other frames in the folder are of the same job.
     keeps_others: bool,
+    /// The frames that the folder has after the run; none is all of the sequence.
+    frames: Option<FrameList>,
     /// The job that the folder has to hold before the first frame.
     to_write: Option<Cow<'a, Job>>,
     /// What killed runs left is gone.
@@ -55,6 +60,7 @@ impl<'a> Claim<'a> {
             folder,
             is_new: true,
             keeps_others: false,
+            frames: job.frames.clone(),
             to_write: Some(Cow::Borrowed(job)),
             is_clean: false,
             lock,
@@ -79,8 +85,14 @@ impl<'a> Claim<'a> {
         }
         let both =
             before.frames.as_ref().zip(job.frames.as_ref()).map(|(a, b): (&FrameList, &FrameList)| a.and(b));
+        let frames = both.clone();
         let to_write = (both != before.frames).then(|| Cow::Owned(Job { frames: both, ..job.clone() }));
-        Ok(Self { folder, is_new: !resume, keeps_others: true, to_write, is_clean: false, lock })
+        Ok(Self { folder, is_new: !resume, keeps_others: true, frames, to_write, is_clean: false, lock })
+    }
+
+    /// The frames of the job that the folder may have after the run; none is all of the sequence.
+    pub(crate) fn frames(&self) -> Option<&FrameList> {
+        self.frames.as_ref()
     }
 
     /// Makes the folder that of the job; later calls do nothing. Returns what there is to say.
@@ -123,9 +135,10 @@ fn remove_results(folder: &Path) -> Outcome<usize> {
     Ok(removed)
 }
 
-/// Names that a run gives: `frame.0001.png`, `frame.0001.CHANNEL.exr`, and those of the whole.
-fn is_result(name: &str) -> bool {
-    if [STATS_FILE, SHEET_FILE, VIDEO_FILE, HEAD_FILE].contains(&name) {
+/// Names that a run gives: `frame.0001.png`, `frame.0001.exr`, `frame.0001.CHANNEL.exr`, and those of the whole.
+pub(crate) fn is_result(name: &str) -> bool {
+    let whole = [STATS_FILE, SHEET_FILE, VIDEO_FILE, HEAD_FILE, PAGE_FILE, TIMELINE_FILE, MANIFEST_FILE];
+    if whole.contains(&name) {
         return true;
     }
     let Some((number, rest)) = name.strip_prefix("frame.").and_then(|n| n.split_once('.')) else {
@@ -133,7 +146,7 @@ fn is_result(name: &str) -> bool {
     };
     let is_number = number.len() >= 4 && number.bytes().all(|b| b.is_ascii_digit());
     let is_channel = |c: &str| CHANNELS.iter().any(|row| row.channel.name() == c);
-    is_number && (rest == "png" || rest.strip_suffix(".exr").is_some_and(is_channel))
+    is_number && (["png", "exr"].contains(&rest) || rest.strip_suffix(".exr").is_some_and(is_channel))
 }
 
 /// The lock of a folder. The system gives it up when the process ends, however that happens.
@@ -231,7 +244,17 @@ mod tests {
 
     #[test]
     fn only_results_of_runs_are_removed() {
-        for name in ["frame.0001.png", "frame.12345.png", "frame.0001.depth.exr", "stats.json", "video.mp4"] {
+        for name in [
+            "frame.0001.png",
+            "frame.12345.png",
+            "frame.0001.exr",
+            "frame.0001.depth.exr",
+            "stats.json",
+            "video.mp4",
+            "review.html",
+            "sequence.otio",
+            "manifest.json",
+        ] {
             assert!(is_result(name), "{name}");
         }
         for name in

@@ -9,6 +9,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use clap::ValueEnum;
 use rubor_renderer::settings::{Preset, Settings};
 use rubor_rig::expression::Rig;
 use rubor_rig::json;
@@ -22,6 +23,7 @@ use crate::auto::Auto;
 use crate::environment;
 use crate::error::{Failure, Outcome};
 use crate::inputs::{self, LoadedHead};
+use crate::layers;
 use crate::output;
 use crate::review::inset;
 
@@ -58,9 +60,23 @@ pub struct Job {
     /// A map of the first head's current state in a corner of each frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inset: Option<inset::Map>,
+    /// Files of each frame.
+    #[serde(default, skip_serializing_if = "Format::is_default")]
+    pub format: Format,
     /// Only these frames; without it, all of the sequence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames: Option<FrameList>,
+}
+
+/// Files of each frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Format {
+    /// The displayed picture
+    #[default]
+    Png,
+    /// The displayed picture, and an OpenEXR file of light, depth, normals, motion, chromophores, masks and ids as layers
+    Exr,
 }
 
 /// A file that a job depends on.
@@ -120,6 +136,18 @@ impl Fingerprint {
     }
 }
 
+impl Format {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
 impl Job {
     /// A performance on heads, with default settings of the size that the sequence asks for.
     ///
@@ -139,6 +167,7 @@ impl Job {
             settings,
             auto: None,
             inset: None,
+            format: Format::Png,
             frames: None,
         };
         job.note_environment()?;
@@ -152,6 +181,16 @@ impl Job {
     pub fn relight(&mut self, lights: Lighting) -> Outcome {
         self.lights = Some(lights);
         self.note_environment()
+    }
+
+    /// The settings that frames are drawn with: with the channels that the files of a frame are made of.
+    pub fn drawn_settings(&self) -> Settings {
+        let mut settings = self.settings.clone();
+        if self.format == Format::Exr {
+            let wanted = &mut settings.output.channels;
+            wanted.extend(layers::CHANNELS.iter().filter(|c| !self.settings.output.channels.contains(c)));
+        }
+        settings
     }
 
     /// The sequence as it is drawn: with the lights of the job.
@@ -270,6 +309,15 @@ impl Job {
     pub fn draws_like(&self, other: &Self) -> Outcome<bool> {
         let text = |job: &Self| Self { frames: None, schema: None, ..job.clone() }.to_json();
         Ok(text(self)? == text(other)?)
+    }
+
+    /// A number that changes with the pixels of the job: that of its text, whichever frames it draws.
+    ///
+    /// # Errors
+    /// A number that JSON cannot represent.
+    pub fn identity(&self) -> Outcome<Fingerprint> {
+        let all = Self { frames: None, schema: None, ..self.clone() };
+        Ok(Fingerprint::of(all.to_json()?.as_bytes()))
     }
 
     /// JSON schema of the file.

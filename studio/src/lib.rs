@@ -5,7 +5,7 @@
 //!                                                |
 //! Job + LoadedHead --Plan (checked)--> frames --Studio (device)--> pictures
 //!                                        |
-//!        run: a folder of frames, contact sheet, video, animated head, stats.json (Report)
+//!        run: a folder of frames, review page, contact sheet, video, timeline, animated head, stats.json (Report), manifest
 //!        measure: bench, chart, difference --> Report          gallery: one page --> Report
 //! ```
 //!
@@ -48,6 +48,8 @@ pub mod farm;
 pub mod gallery;
 pub mod inputs;
 pub mod job;
+pub mod layers;
+pub mod manifest;
 pub mod measure;
 pub mod notes;
 pub mod output;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rubor_assets::files;
 use rubor_assets::image_io::{ImageError, SampleKind};
-use rubor_renderer::channels::{Channel, ChannelData};
+use rubor_renderer::channels::ChannelData;
 use rubor_rig::map::Map;
 use serde::Serialize;
 
@@ -76,9 +76,9 @@ pub fn save_channel(path: &Path, data: &ChannelData) -> Outcome {
     let names = data.channel.row().components;
     let samples = |c: usize| {
         let values = data.values.iter().skip(c).step_by(names.len());
-        match data.channel {
-            Channel::Ids => FlatSamples::U32(values.map(|v| v.to_bits()).collect()),
-            _ => FlatSamples::F32(values.copied().collect()),
+        match data.channel.is_whole() {
+            true => FlatSamples::U32(values.map(|v| v.to_bits()).collect()),
+            false => FlatSamples::F32(values.copied().collect()),
         }
     };
     let channels = (0..names.len()).map(|c| AnyChannel::new(names[c], samples(c))).collect();
@@ -95,6 +95,8 @@ pub fn save_channel(path: &Path, data: &ChannelData) -> Outcome {
 
 #[cfg(test)]
 mod tests {
+    use rubor_renderer::channels::Channel;
+
     use super::*;
 
     #[test]

@@ -7,8 +7,10 @@
 //!
 //! Frames do not depend on which others are drawn. Antialiasing over time mixes the light of the previous frame into a
 //! frame, depending on the speeds of both, and the speed of the previous frame comes from positions one frame earlier.
-//! So where a frame does not follow the last one drawn, the two before it are drawn first, after a cut.
+//! So where a frame does not follow the last one drawn, the two before it are drawn first, after a cut. For motion as a
+//! channel it is the one before.
 
+use rubor_renderer::channels::Channel;
 use rubor_renderer::settings::Settings;
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::head::Head;
@@ -31,10 +33,11 @@ pub struct Plan<'a> {
     heads: &'a [LoadedHead],
     evaluators: Vec<Evaluator>,
     frames: Vec<u32>,
+    settings: Settings,
     spacing_m: f32,
     /// What was chosen for the frames up to the last one that is drawn, and settings with it; empty without `auto`.
     chosen: Vec<Chosen>,
-    settings: Vec<Settings>,
+    settings_of_frames: Vec<Settings>,
     notes: Vec<Note>,
 }
 
@@ -85,7 +88,8 @@ impl<'a> Plan<'a> {
             frames,
             spacing_m,
             chosen: Vec::new(),
-            settings: Vec::new(),
+            settings: job.drawn_settings(),
+            settings_of_frames: Vec::new(),
             notes,
         };
         if let Some(auto) = &job.auto {
@@ -109,8 +113,8 @@ impl<'a> Plan<'a> {
             outlines.iter().zip(&shots).map(seen).collect()
         });
         self.chosen = auto.run(features, size);
-        self.settings =
-            self.chosen.iter().map(|c| auto.settings(&self.job.settings, c)).collect::<Outcome<_>>()?;
+        self.settings_of_frames =
+            self.chosen.iter().map(|c| auto.settings(&self.settings, c)).collect::<Outcome<_>>()?;
         let device = &auto.calibration.adapter.name;
         let about = format!("settings by need ({}), by the estimates for {device}", auto.bound);
         self.notes.push(Note::new("auto", about));
@@ -142,7 +146,7 @@ impl<'a> Plan<'a> {
 
     /// Settings of a frame.
     pub fn settings(&self, frame: u32) -> &Settings {
-        self.settings.get(frame as usize).unwrap_or(&self.job.settings)
+        self.settings_of_frames.get(frame as usize).unwrap_or(&self.settings)
     }
 
     /// The job.
@@ -153,6 +157,11 @@ impl<'a> Plan<'a> {
     /// Its heads.
     pub fn heads(&self) -> &'a [LoadedHead] {
         self.heads
+    }
+
+    /// The performance on the first head.
+    pub fn evaluator(&self) -> Option<&Evaluator> {
+        self.evaluators.first()
     }
 
     /// Frames of the job by their index from 0, ascending.
@@ -196,7 +205,11 @@ impl<'a> Plan<'a> {
         frames: &[u32],
         mut take: impl FnMut(Shown) -> Outcome,
     ) -> Outcome {
-        let before = if self.job.settings.quality.antialias.is_temporal() { REMEMBERED_FRAMES } else { 0 };
+        let settings = &self.settings;
+        let before = match settings.quality.antialias.is_temporal() {
+            true => REMEMBERED_FRAMES,
+            false => u32::from(settings.output.channels.contains(&Channel::Velocity)),
+        };
         let mut last = None;
         let mut waiting = None;
         for &frame in frames {

@@ -1,9 +1,9 @@
 //! The main job: the frames of a plan to a folder, with everything that a review needs beside them.
 //!
 //! ```text
-//! Plan --draw--> frame n+1 | writers: frame n --> frame.0001.png ...
-//!                                        +--> contact_sheet.png, video.mp4
-//! heads --------> animated_head.glb      job.json, stats.json
+//! Plan --draw--> frame n+1 | writers: frame n --> frame.0001.png, frame.0001.exr ...
+//!                                        +--> contact_sheet.png, video.mp4, sequence.otio
+//! heads --------> animated_head.glb      job.json, stats.json --> review.html --> manifest.json
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,15 +14,19 @@ use image::RgbImage;
 use rubor_assets::{export, files};
 use rubor_renderer::footprint;
 
-use crate::claim::Claim;
+use crate::claim::{self, Claim};
 use crate::error::{Failure, Fault, Outcome};
-use crate::job::Job;
+use crate::job::{Format, Job};
+use crate::layers;
+use crate::manifest::{MANIFEST_FILE, Manifest};
 use crate::notes::{Note, summed};
 use crate::output;
 use crate::plan::{Plan, Shown};
 use crate::report::{AutoRun, JobReport, PassTimes, Report, median};
 use crate::review::inset::Inset;
-use crate::review::{contact_sheet, video};
+use crate::review::page::{self, FrameCost, PAGE_FILE, PageData};
+use crate::review::timeline::{self, TIMELINE_FILE};
+use crate::review::{contact_sheet, text, video};
 use crate::stop::Stop;
 use crate::studio::{Frame, Studio};
 use crate::watch::Watch;
@@ -50,6 +54,8 @@ pub struct Destination {
     pub chunks: Option<PathBuf>,
     /// Make a video, if the job has all frames.
     pub video: bool,
+    /// Write frame, time and expressions onto the pictures of the video.
+    pub burn_in: bool,
     /// Write the first head with its performance.
     pub animated_head: bool,
     /// Asks the run to stop after the frame at hand.
@@ -60,7 +66,15 @@ impl Destination {
     /// Everything into a folder, all of it new.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
         let stop = Stop::default();
-        Self { folder: folder.into(), resume: false, chunks: None, video: true, animated_head: true, stop }
+        Self {
+            folder: folder.into(),
+            resume: false,
+            chunks: None,
+            video: true,
+            burn_in: false,
+            animated_head: true,
+            stop,
+        }
     }
 }
 
@@ -122,14 +136,14 @@ pub fn run(
 
     let mut times = PassTimes::default();
     let mut first_frame_s = None;
-    let mut seconds = Vec::new();
+    let mut costs: BTreeMap<u32, FrameCost> = BTreeMap::new();
     let write = |page: Page| -> Outcome<Written> {
         let Page { place, shown: Shown { frame, shots, drawn } } = page;
         let mut picture = drawn.picture();
         if let (Some(inset), Some(shot)) = (&inset, shots.first()) {
             inset.draw(&shot.face, &job.settings.quality, &mut picture);
         }
-        save_channels(&to.folder, frame, &drawn)?;
+        save_channels(job, &to.folder, frame, &drawn)?;
         // Written last: if the picture of a frame exists, the frame is complete.
         output::save_picture(&frame_path(&to.folder, frame), &picture)?;
         let small = on_sheet.contains(&(place as u32)).then(|| contact_sheet::reduce(&picture));
@@ -147,9 +161,12 @@ pub fn run(
         plan.draw(studio, &to_draw, |shown| {
             // With the first frame, so that a job that cannot be drawn leaves nothing.
             notes.extend(claim.take()?);
-            seconds.push(since.elapsed().as_secs_f64());
+            let seconds = since.elapsed().as_secs_f64();
             since = Instant::now();
-            times.add(&shown.drawn.stats);
+            let stats = &shown.drawn.stats;
+            times.add(stats);
+            let passes_ms = stats.passes_ms.iter().map(|(name, ms)| (*name, *ms)).collect();
+            costs.insert(shown.frame, FrameCost { seconds, passes_ms });
             let place = plan.frames().partition_point(|f| *f < shown.frame);
             push(Page { place, shown })?;
             stop_if_asked(&to.stop)
@@ -167,16 +184,17 @@ pub fn run(
     watch.notes(&of_surroundings);
     notes.extend(of_surroundings);
     let mut files = vec![PathBuf::from(SHEET_FILE)];
-    let small: Vec<RgbImage> = sheet.into_values().collect();
+    let words = |place: usize| plan.frames().get(place).map(|frame| moment(plan, *frame)).unwrap_or_default();
+    let small: Vec<(RgbImage, Vec<String>)> =
+        sheet.into_iter().map(|(place, small)| (small, words(place))).collect();
     output::save_picture(&to.folder.join(SHEET_FILE), &contact_sheet::page(&small))?;
     // A video that fails costs neither the head nor the report.
     let mut failed = None;
     if to.video && job.frames.is_none() {
-        match video::encode(&to.folder, plan.frames().len(), job.sequence.fps, VIDEO_FILE) {
+        match make_video(plan, to) {
             Ok(video::Video::Written) => files.push(VIDEO_FILE.into()),
             Ok(video::Video::NoEncoder) => {
-                let message = "no video: the program ffmpeg is not on this machine (Debian, Ubuntu: ffmpeg)";
-                let note = Note::new("", message);
+                let note = Note::new("", video::NO_ENCODER);
                 watch.notes(std::slice::from_ref(&note));
                 notes.push(note);
             }
@@ -188,6 +206,30 @@ pub fn run(
         export_animated(plan, &to.folder)?;
         files.push(HEAD_FILE.into());
     }
+    // Frames that other runs of this job left are on the page too.
+    let mut on_page: Vec<u32> = match claim.frames() {
+        None => (0..plan.evaluator().map_or(0, |evaluator| evaluator.frame_count())).collect(),
+        Some(list) => list.numbers().iter().map(|number| number - 1).collect(),
+    };
+    on_page.retain(|frame| frame_path(&to.folder, *frame).is_file());
+    if let [first, .., last] | [first @ last] = on_page[..] {
+        let name = page::title(&to.folder);
+        let video = files.iter().any(|file| file.as_os_str() == VIDEO_FILE).then_some(VIDEO_FILE);
+        let clip = timeline::Clip { name: &name, frames: [first + 1, last + 1], video };
+        output::write_json(&to.folder.join(TIMELINE_FILE), &timeline::of(&job.sequence, &clip))?;
+        files.push(TIMELINE_FILE.into());
+    }
+    if on_page.len() > page::MOST_FRAMES {
+        let found =
+            format!("no page: found {} frames, expected at most {}", on_page.len(), page::MOST_FRAMES);
+        let note = Note::new(PAGE_FILE, found);
+        watch.notes(std::slice::from_ref(&note));
+        notes.push(note);
+    } else {
+        files.push(PAGE_FILE.into());
+    }
+    files.push(MANIFEST_FILE.into());
+    let mut seconds: Vec<f64> = costs.values().map(|cost| cost.seconds).collect();
     let report = JobReport {
         adapter: studio.adapter(),
         settings: job.settings.clone(),
@@ -207,6 +249,13 @@ pub fn run(
         notes: summed(&notes),
     };
     output::write_json(&to.folder.join(STATS_FILE), &Report::Job(report.clone()))?;
+    if on_page.len() <= page::MOST_FRAMES {
+        let inset = job.inset.zip(inset.as_ref());
+        let data = PageData::new(plan, &on_page, &to.folder, inset, &costs, &report)?;
+        data.write(&to.folder.join(PAGE_FILE))?;
+    }
+    let is_listed = |name: &str| name == JOB_FILE || claim::is_result(name);
+    Manifest::of(&to.folder, is_listed)?.write(&to.folder)?;
     match failed {
         Some(failure) => Err(failure),
         None => Ok(report),
@@ -245,6 +294,9 @@ fn gather(job: &Job, chunks: &Path, folder: &Path) -> Outcome {
                 let name = channel.name();
                 copy(channel_path(&run, frame, &name), channel_path(folder, frame, &name))?;
             }
+            if job.format == Format::Exr {
+                copy(layers_path(&run, frame), layers_path(folder, frame))?;
+            }
             copy(frame_path(&run, frame), frame_path(folder, frame))?;
         }
     }
@@ -279,21 +331,80 @@ pub fn channel_path(folder: &Path, frame: u32, channel: &str) -> PathBuf {
     folder.join(format!("frame.{:04}.{channel}.exr", frame + 1))
 }
 
+/// The file of the layers of a frame, from 0; files are numbered from 1.
+pub fn layers_path(folder: &Path, frame: u32) -> PathBuf {
+    folder.join(format!("frame.{:04}.exr", frame + 1))
+}
+
 /// Whether a frame exists with all its channels, complete and of the right size.
 fn read_frame(job: &Job, folder: &Path, frame: u32, size: [u32; 2]) -> Option<RgbImage> {
     let mut channels = job.settings.output.channels.iter();
-    if channels.any(|c| !channel_path(folder, frame, &c.name()).is_file()) {
+    if channels.any(|c| !channel_path(folder, frame, &c.name()).is_file())
+        || (job.format == Format::Exr && !layers_path(folder, frame).is_file())
+    {
         return None;
     }
     let image = image::open(frame_path(folder, frame)).ok()?.into_rgb8();
     (image.dimensions() == (size[0], size[1])).then_some(image)
 }
 
-fn save_channels(folder: &Path, frame: u32, drawn: &Frame) -> Outcome {
-    drawn
-        .channels
-        .iter()
-        .try_for_each(|data| output::save_channel(&channel_path(folder, frame, &data.channel.name()), data))
+fn save_channels(job: &Job, folder: &Path, frame: u32, drawn: &Frame) -> Outcome {
+    let output = &job.settings.output;
+    for data in drawn.channels.iter().filter(|data| output.channels.contains(&data.channel)) {
+        output::save_channel(&channel_path(folder, frame, &data.channel.name()), data)?;
+    }
+    if job.format == Format::Png {
+        return Ok(());
+    }
+    let about = layers::About {
+        size: output.size,
+        number: frame + 1,
+        fps: job.sequence.fps,
+        near_metres: rubor_renderer::NEAR_METRES,
+    };
+    layers::write(&layers_path(folder, frame), &drawn.channels, &about)
+}
+
+/// A frame in words: its number and time, then the expressions and states that show, the strongest first.
+fn moment(plan: &Plan<'_>, frame: u32) -> Vec<String> {
+    // Weights under this do not show.
+    const LEAST: f32 = 0.05;
+    let Some(evaluator) = plan.evaluator() else { return Vec::new() };
+    let time_s = evaluator.frame_time_s(frame);
+    let (rig, weights) = (evaluator.rig(), evaluator.weights_at(time_s));
+    let expressions = rig.expression_names().zip(&weights.expressions);
+    let mut shown: Vec<(&str, f32)> = expressions
+        .chain(rig.state_names().zip(&weights.states))
+        .map(|(name, weight)| (name, *weight))
+        .filter(|(_, weight)| *weight >= LEAST)
+        .collect();
+    shown.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut words = vec![format!("{:04}  {time_s:.2} s", frame + 1)];
+    words.extend(shown.iter().map(|(name, weight)| format!("{name} {weight:.2}")));
+    words
+}
+
+/// Encodes the frames.
+fn make_video(plan: &Plan<'_>, to: &Destination) -> Outcome<video::Video> {
+    let pictures = plan.frames().iter().map(|frame| {
+        let path = frame_path(&to.folder, *frame);
+        let mut picture = image::open(&path).map_err(|e| Failure::read(&path, e))?.into_rgb8();
+        if to.burn_in {
+            let height = letters(picture.height());
+            for (line, words) in moment(plan, *frame).iter().enumerate() {
+                let top = height * (1.0 + 1.8 * line as f32);
+                text::draw_on_picture(&mut picture, [height, top], height, words);
+            }
+        }
+        Ok(picture)
+    });
+    let job = plan.job();
+    video::encode(&to.folder.join(VIDEO_FILE), job.settings.output.size, job.sequence.fps, pictures)
+}
+
+/// Height of capitals on a picture, pixels.
+pub(crate) fn letters(picture_height: u32) -> f32 {
+    (picture_height as f32 / 40.0).max(8.0)
 }
 
 /// Writes the (first) head with its performance.

@@ -190,8 +190,11 @@ impl Studio {
     pub fn finish(&mut self, drawn: Drawn) -> Outcome<Frame> {
         let (image, stats, channels) = native::wait(self.renderer.gpu(), drawn.frame.finish_with_channels())?;
         if channels.len() < drawn.channels {
-            return Err(Failure::input("channels: found velocity, which this frame does not have")
-                .hint("velocity needs --antialias smaa-t2x or smaa-4x"));
+            let found = channels.len();
+            return Err(Failure::job(format!(
+                "channels: found {found}, expected {}: this frame does not have them all",
+                drawn.channels
+            )));
         }
         Ok(Frame { image, stats, channels })
     }

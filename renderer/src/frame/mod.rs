@@ -23,6 +23,7 @@ use crate::passes::display::Display;
 use crate::passes::geometry::morph::Morph;
 use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::geometry::shadow::Shadow;
+use crate::passes::geometry::surface_data::{self, SurfaceData};
 use crate::passes::geometry::tangent_frames::TangentFrames;
 use crate::passes::geometry::velocity::Velocity;
 use crate::passes::geometry::visibility::Visibility;
@@ -56,6 +57,7 @@ pub(crate) struct Passes {
     /// Present if the settings ask for it.
     pub(crate) antialias: Option<Antialias>,
     pub(crate) transmittance: Option<(Arc<Profile>, Transmittance)>,
+    pub(crate) surface_data: Option<SurfaceData>,
 }
 
 /// A frame while it is recorded.
@@ -110,6 +112,7 @@ impl Passes {
             display: Display::new(gpu, tone_map),
             antialias: None,
             transmittance: None,
+            surface_data: None,
         }
     }
 
@@ -142,6 +145,11 @@ impl Passes {
             self.transmittance = None;
         } else if self.transmittance.as_ref().is_none_or(|(p, _)| p != profile) {
             self.transmittance = Some((profile.clone(), Transmittance::new(gpu, profile)?));
+        }
+        if !surface_data::is_wanted(settings) {
+            self.surface_data = None;
+        } else if self.surface_data.is_none() {
+            self.surface_data = Some(SurfaceData::new(gpu));
         }
         let has_own_color = scene.heads.iter().any(|h| h.head.maps.as_ref().is_some_and(|m| m.has_own_color));
         self.shade.prepare_specular(gpu, settings.quality.specular, has_own_color);

@@ -6,6 +6,7 @@ use crate::device::{Image, ImageSpec, Recorder};
 use crate::error::RenderError;
 use crate::passes::antialias::{self, History, Subsample};
 use crate::passes::diffusion::Before;
+use crate::passes::geometry::surface_data;
 use crate::passes::shade::{Lighting, Lit, SkinLight};
 use crate::scene::lamp::{Illumination, place_lights};
 use crate::scene::placement::{average_light, receivers};
@@ -116,7 +117,7 @@ impl<'a> Frame<'a> {
         let inputs = [diffuse, &lit.albedo, &lit.direct, &seen.depth];
         let hdr = passes.compose.record(r, self.scene.background_linear, inputs);
         let is_first = samples.seen.is_empty();
-        let moves = is_first && self.settings.quality.antialias.is_temporal();
+        let moves = is_first && self.remembers();
         let velocity = moves.then(|| passes.velocity.record(r, &seen, &self.heads));
         let hair = (&passes.fibre, light);
         passes.cropped_hair.record(
@@ -152,6 +153,10 @@ impl<'a> Frame<'a> {
         if let Some(velocity) = &velocity {
             self.keep([(Channel::Velocity, velocity)]);
         }
+        if let Some(pass) = &passes.surface_data {
+            let images = pass.record(r, &seen, &self.heads);
+            self.keep(surface_data::CHANNELS.into_iter().zip(&images));
+        }
         let look = &self.settings.look;
         let resolved = passes.resolve.record(r, look, self.settings.samples_per_side(), hdr);
         match self.into.filter(|_| passes.antialias.is_none()) {
@@ -174,6 +179,7 @@ impl<'a> Frame<'a> {
     ) -> Result<Option<Image>, RenderError> {
         let size = self.settings.output.size;
         let Some(antialias) = &self.passes.antialias else {
+            self.remember(r);
             return Ok(samples.displayed.into_iter().next());
         };
         let colors: Vec<_> = samples.displayed.iter().map(Image::view).collect();
@@ -197,17 +203,31 @@ impl<'a> Frame<'a> {
         if let Some(output) = output {
             antialias.record(r.gpu, r.encoder, r.timer, &inputs, output, history)?;
         }
-        if is_temporal {
-            for head in &self.heads {
-                let (from, to) = (head.positions, head.kept_positions);
-                r.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
-            }
-            let camera = &self.scene.camera;
-            let aspect = size[0] as f32 / size[1] as f32;
-            self.past.clip_from_world = Some(camera.clip_from_view(aspect) * camera.view_from_world());
-            self.past.frames += 1;
-        }
+        self.remember(r);
         Ok(picture)
+    }
+
+    /// Whether frames know how the surface moved since the one before.
+    fn remembers(&self) -> bool {
+        self.settings.quality.antialias.is_temporal()
+            || self.settings.output.channels.contains(&Channel::Velocity)
+    }
+
+    /// Keeps the places of the surface and the camera for the next frame.
+    fn remember(&mut self, r: &mut Recorder<'_>) {
+        if !self.remembers() {
+            return;
+        }
+        for head in &self.heads {
+            let (from, to) = (head.positions, head.kept_positions);
+            r.encoder.copy_buffer_to_buffer(from, 0, to, 0, from.size());
+        }
+        let [width, height] = self.settings.output.size;
+        let camera = &self.scene.camera;
+        let clip_from_view = camera.clip_from_view(width as f32 / height as f32);
+        self.past.clip_from_world = Some(clip_from_view * camera.view_from_world());
+        // The places of samples alternate only where the previous frame takes part in the picture.
+        self.past.frames += u64::from(self.settings.quality.antialias.is_temporal());
     }
 
     /// Holds images that will be read back, so that no later pass reuses them.

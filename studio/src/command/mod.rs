@@ -54,7 +54,7 @@ struct Arguments {
 enum Command {
     /// Render the built-in head through six expressions, blush, pallor and exercise
     Demo(demo::Arguments),
-    /// Render a sequence to frames, a contact sheet, a video and an animated head
+    /// Render a sequence to frames, a review page, a contact sheet, a video and an animated head
     Render(render::Arguments),
     /// Draw a page of views, expressions, lights and characters
     Gallery(gallery::Arguments),
@@ -70,7 +70,7 @@ enum Command {
     Maya(maya::Arguments),
     /// Antialias images
     Filter(filter::Arguments),
-    /// Measure how far two images or two folders of images are apart
+    /// Measure how far two images or two folders of images are apart; show two runs on a page or in a video
     Compare(compare::Arguments),
     /// Chart the cost and the error of scattering methods
     Chart(chart::Arguments),
@@ -90,7 +90,7 @@ enum Command {
     Completions(manual::Completions),
     /// Write manual pages
     Man(manual::Man),
-    /// Print the JSON schema of a job, its settings, a rig, a sequence or a report
+    /// Print the JSON schema of a job, its settings, a rig, a sequence, a report or a manifest
     Schema(schema::Arguments),
 }
 

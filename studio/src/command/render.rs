@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use rubor::auto::{Auto, Bound, Calibration};
 use rubor::inputs::{self, LoadedHead};
-use rubor::job::FrameList;
+use rubor::job::{Format, FrameList};
 use rubor::notes::Note;
 use rubor::review::inset;
 use rubor::{Destination, Job, Outcome, Plan, Report, Studio, Watch, run};
@@ -64,6 +64,9 @@ pub(crate) struct Changes {
     /// Choose the most exact settings for each frame that fit into a time, in milliseconds
     #[arg(long, value_name = "MS", conflicts_with = "max_error", value_parser = parse_budget)]
     budget_ms: Option<Bound>,
+    /// Files of each frame
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    format: Option<Format>,
     /// Draw only these frames, such as 1,12-20 (the first is 1); makes no video
     #[arg(long, value_name = "LIST")]
     frames: Option<FrameList>,
@@ -97,6 +100,9 @@ pub(crate) struct Results {
     /// Make no video
     #[arg(long)]
     no_video: bool,
+    /// Write frame, time and expressions onto the pictures of the video
+    #[arg(long, conflicts_with = "no_video")]
+    burn_in: bool,
     /// Write no animated head
     #[arg(long)]
     no_export: bool,
@@ -169,6 +175,7 @@ impl Changes {
         self.settings.overlay(&mut job.settings)?;
         job.sequence.fps = self.fps.unwrap_or(job.sequence.fps);
         job.inset = self.inset.or(job.inset);
+        job.format = self.format.unwrap_or(job.format);
         job.frames = self.frames.clone().or(job.frames.take());
         Ok(())
     }
@@ -217,6 +224,7 @@ impl Results {
             resume,
             chunks,
             video: !self.no_video,
+            burn_in: self.burn_in,
             animated_head: !self.no_export,
             stop: signals::watched()?,
         };

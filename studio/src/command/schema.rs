@@ -1,6 +1,7 @@
 //! `rubor schema`: JSON schemas for editors.
 
 use clap::ValueEnum;
+use rubor::manifest::Manifest;
 use rubor::{Job, Outcome, Report};
 use rubor_renderer::settings::Settings;
 
@@ -24,6 +25,8 @@ enum Kind {
     Sequence,
     /// Measurements of a job, a benchmark, a chart or a gallery: stats.json and --json
     Report,
+    /// Files of a run with their checksums: manifest.json
+    Manifest,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
@@ -33,5 +36,6 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         Kind::Rig => rubor_rig::expression::rig_schema(),
         Kind::Sequence => rubor_rig::timeline::sequence_schema(),
         Kind::Report => Report::json_schema_value(),
+        Kind::Manifest => Manifest::json_schema_value(),
     })
 }

@@ -90,12 +90,18 @@ impl Inset {
             let code = if self.skin.mapped[i] { (grey[i] * 255.0).round() as u8 } else { BACKGROUND };
             image::Rgb([code; 3])
         });
-        let side = SHARE * picture.width().min(picture.height()) as f32;
-        let factor = side / width.max(height) as f32;
+        let [x, y, w, h] = self.place([picture.width(), picture.height()]);
+        let small = resize(&small, w, h, FilterType::Triangle);
+        replace(picture, &small, i64::from(x), i64::from(y));
+    }
+
+    /// Left, top, width and height in a picture of a size, pixels.
+    pub fn place(&self, [wide, high]: [u32; 2]) -> [u32; 4] {
+        let [_, _, width, height] = self.crop;
+        let factor = SHARE * wide.min(high) as f32 / width.max(height) as f32;
         let scaled = |n: u32| ((n as f32 * factor).round() as u32).max(1);
-        let small = resize(&small, scaled(width), scaled(height), FilterType::Triangle);
-        let y = picture.height().saturating_sub(small.height() + MARGIN);
-        replace(picture, &small, i64::from(MARGIN), i64::from(y));
+        let (w, h) = (scaled(width), scaled(height));
+        [MARGIN, high.saturating_sub(h + MARGIN), w, h]
     }
 
     /// 0 to 1, dark where there is more blood.
