@@ -72,7 +72,7 @@ fn normals_chromophores_and_parts_are_those_of_the_point_that_a_pixel_sees() {
     let neutral = maps.hemoglobin.as_ref().expect("a map");
     let mean = maps.hemoglobin_mean.as_ref().expect("a map");
     let blood = blend(neutral, mean, &maps.distributions, &state.distributions, state.hemoglobin_scale);
-    let (mut skin, mut gums, mut empty) = (0, 0, 0);
+    let (mut skin, mut gums, mut empty, mut compared) = (0, 0, 0, 0);
     for i in 0..(size * size) as usize {
         let id = ids[i][0].to_bits();
         let Some(hit) = seen_surface(&head, &points, id, &camera, size, i as u32, [0.0; 2]) else {
@@ -106,6 +106,11 @@ fn normals_chromophores_and_parts_are_those_of_the_point_that_a_pixel_sees() {
                 })
                 .sum()
         });
+        // At a slant a pixel covers much of the texture, and beside its edge a filter reaches around it.
+        if expected.z < 0.6 || uv.iter().any(|v| !(0.06..0.94).contains(v)) {
+            continue;
+        }
+        compared += 1;
         let sampled = |map: &rubor_rig::map::Map| map.sample(uv[0] as f32, uv[1] as f32, 0);
         let melanin_map = maps.melanin.as_ref().expect("a map");
         for (found, expected) in [(melanin[i], sampled(melanin_map)), (hemoglobin[i], sampled(&blood))] {
@@ -113,5 +118,6 @@ fn normals_chromophores_and_parts_are_those_of_the_point_that_a_pixel_sees() {
             assert!((found - expected).abs() < 0.03 * expected, "pixel {i}: {found}, expected {expected}");
         }
     }
+    assert!(compared > 100, "{compared} pixels of skin compared");
     assert!(skin > 200 && gums > 200 && empty > 100, "{skin} of skin, {gums} of gums, {empty} of nothing");
 }
