@@ -20,7 +20,7 @@ mod shots;
 use std::path::PathBuf;
 
 use rubor_renderer::settings::{Settings, leaves};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -43,9 +43,17 @@ const HYSTERESIS: f64 = 0.85;
 #[serde(rename_all = "camelCase")]
 pub enum Bound {
     /// Mean FLIP over the head, above 0.
-    Flip(f64),
+    Flip(#[schemars(schema_with = "flip_schema")] f64),
     /// Milliseconds of a frame, above 0.
-    Milliseconds(f64),
+    Milliseconds(#[schemars(schema_with = "milliseconds_schema")] f64),
+}
+
+fn flip_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "number", "exclusiveMinimum": 0, "description": "Mean FLIP over the head." })
+}
+
+fn milliseconds_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "number", "exclusiveMinimum": 0, "description": "Milliseconds of a frame." })
 }
 
 impl std::str::FromStr for Bound {
@@ -86,6 +94,9 @@ pub struct Auto {
     #[schemars(with = "serde_json::Value")]
     pub calibration: Calibration,
 }
+
+/// What counts first and second in a comparison; less is better.
+type Rank = fn(&Chosen) -> (f64, f64);
 
 /// What was chosen for a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -189,7 +200,7 @@ impl Auto {
         }
         let stays = before.and_then(|b| all.iter().find(|c| c.choices == b.choices && c.is_kept));
         // What is better: cheaper under a bound of error, more exact under one of time; the nearest where nothing keeps it.
-        let (limit, better): (f64, fn(&Chosen) -> (f64, f64)) = match self.bound {
+        let (limit, better): (f64, Rank) = match self.bound {
             Bound::Flip(most) => (most, |c| (c.milliseconds, c.flip)),
             Bound::Milliseconds(most) => (most, |c| (c.flip, c.milliseconds)),
         };
@@ -241,7 +252,11 @@ impl Auto {
     /// What was chosen, in words.
     pub fn words(&self, chosen: &Chosen) -> String {
         let of = |(group, choice): (&calibration::Group, &Option<usize>)| {
-            choice.and_then(|c| group.choices.get(c)).map(|c| format!("{} {}", group.flag, c.name))
+            choice.and_then(|c| group.choices.get(c)).map(|c| match c.name.starts_with(&group.flag) {
+                // Numbers have the name of their setting.
+                true => c.name.clone(),
+                false => format!("{} {}", group.flag, c.name),
+            })
         };
         let names: Vec<String> = self.calibration.groups.iter().zip(&chosen.choices).filter_map(of).collect();
         let kept = if chosen.is_kept { "" } else { "; no choice keeps the bound, this one comes nearest" };

@@ -303,9 +303,9 @@ mod tests {
         // 9 x 9 pixels of backdrop with a hair in a corner.
         let mut linear = vec![[0.1; 3]; 81];
         linear[0] = [0.0; 3];
-        let found = outside(&linear, &vec![true; 81], 9);
+        let found = outside(&linear, &[true; 81], 9);
         assert!(!found[2 * 9 + 2] && found[3 * 9 + 2] && found[4 * 9 + 4]);
-        assert!(outside(&linear, &vec![false; 81], 9).iter().all(|o| !o));
+        assert!(outside(&linear, &[false; 81], 9).iter().all(|o| !o));
     }
 
     #[test]
