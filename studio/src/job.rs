@@ -236,6 +236,10 @@ impl Job {
             let place = source.place_of_key(&[json::Step::from("settings")]);
             Failure::input(format!("{place}{e}"))
         })?;
+        if let Some(auto) = &job.auto {
+            let place = source.place_of_key(&[json::Step::from("auto")]);
+            auto.check().map_err(|e| Failure::input(format!("{place}{e}")))?;
+        }
         job.sequence.check()?;
         let from_file = |path: &mut PathBuf| -> Outcome {
             *path = inputs::absolute(&folder.join(&*path))?;
@@ -307,8 +311,7 @@ impl Job {
     /// # Errors
     /// A number that JSON cannot represent.
     pub fn draws_like(&self, other: &Self) -> Outcome<bool> {
-        let text = |job: &Self| Self { frames: None, schema: None, ..job.clone() }.to_json();
-        Ok(text(self)? == text(other)?)
+        Ok(self.of_pixels()? == other.of_pixels()?)
     }
 
     /// A number that changes with the pixels of the job: that of its text, whichever frames it draws.
@@ -316,8 +319,12 @@ impl Job {
     /// # Errors
     /// A number that JSON cannot represent.
     pub fn identity(&self) -> Outcome<Fingerprint> {
-        let all = Self { frames: None, schema: None, ..self.clone() };
-        Ok(Fingerprint::of(all.to_json()?.as_bytes()))
+        Ok(Fingerprint::of(self.of_pixels()?.as_bytes()))
+    }
+
+    /// The text of all that decides pixels, whichever frames are drawn.
+    fn of_pixels(&self) -> Outcome<String> {
+        Self { frames: None, schema: None, ..self.clone() }.to_json()
     }
 
     /// JSON schema of the file.

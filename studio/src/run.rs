@@ -141,7 +141,7 @@ pub fn run(
         let Page { place, shown: Shown { frame, shots, drawn } } = page;
         let mut picture = drawn.picture();
         if let (Some(inset), Some(shot)) = (&inset, shots.first()) {
-            inset.draw(&shot.face, &job.settings.quality, &mut picture);
+            inset.draw(&shot.face, &plan.settings(frame).quality, &mut picture);
         }
         save_channels(job, &to.folder, frame, &drawn)?;
         // Written last: if the picture of a frame exists, the frame is complete.

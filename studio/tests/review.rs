@@ -1,13 +1,16 @@
 //! What a reviewer gets: the page of a run, the page of two runs, and what they say about bad input.
 
+#[path = "support/ffmpeg.rs"]
+mod ffmpeg;
 mod support;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use ffmpeg::has_program;
 use rubor::review::page::PageData;
 use rubor::{Job, Plan};
-use support::{can_draw, has_program};
+use support::can_draw;
 
 fn rubor(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rubor")).args(arguments).output().expect("the command starts")

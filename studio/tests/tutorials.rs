@@ -2,12 +2,15 @@
 
 #![cfg(unix)]
 
+#[path = "support/ffmpeg.rs"]
+mod ffmpeg;
 mod support;
 
 use std::path::Path;
 use std::process::Command;
 
-use support::{can_draw, has_program};
+use ffmpeg::has_program;
+use support::can_draw;
 
 /// The blocks of a page that are for a shell, one after the other.
 fn commands(page: &str) -> String {

@@ -1,9 +1,7 @@
 //! The kernel, the CPU and the exported file put every point of the default head in the same place.
 
-use std::io::Write;
-
 use glam::{Mat4, Vec3};
-use rubor::{Outcome, Studio, studio};
+use rubor::{Outcome, Studio};
 use rubor_assets::{export, import};
 use rubor_renderer::channels::Channel;
 use rubor_renderer::settings::{AntialiasMethod, Output, Quality, ScatterMethod, Settings, TransmitMethod};
@@ -12,6 +10,7 @@ use rubor_rig::evaluate::Evaluator;
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_rig::timeline::Sequence;
+use rubor_tests::can_draw;
 
 /// Largest distance between two of the three, in heights of the head.
 const TOLERANCE: f32 = 1e-5;
@@ -19,16 +18,6 @@ const TOLERANCE: f32 = 1e-5;
 fn default_head() -> Head {
     let bytes = include_bytes!("../../assets/head.glb");
     import::gltf::from_bytes(bytes, "head.glb".as_ref()).expect("the default head is readable").head
-}
-
-/// False, loudly, where nothing can draw.
-fn can_draw() -> bool {
-    let found = !studio::adapters().is_empty();
-    assert!(found || std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
-    if !found {
-        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
-    }
-    found
 }
 
 fn farthest(a: &[Vec3], b: &[Vec3]) -> f32 {

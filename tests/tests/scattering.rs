@@ -1,20 +1,18 @@
 //! Scattering methods on the default head against the integral over its surface.
 
-use std::io::Write;
 use std::path::Path;
 
-use rubor::measure::chart::{self, Effort, Options, Suite};
+use rubor::measure::chart::{self, Effort, Options, RightLight, Suite};
 use rubor::measure::stability;
-use rubor::{Outcome, Studio, studio};
+use rubor::{Outcome, Studio};
 use rubor_assets::import;
 use rubor_renderer::settings::{AntialiasMethod, Output, Quality, Settings};
 use rubor_rig::expression::Rig;
+use rubor_tests::can_draw;
 
 #[test]
 fn pre_integrated_light_on_the_head_is_near_the_reference() -> Outcome {
-    if studio::adapters().is_empty() {
-        assert!(std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
-        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
+    if !can_draw() {
         return Ok(());
     }
     let head = import::gltf::from_bytes(include_bytes!("../../assets/head.glb"), "head.glb".as_ref())?.head;
@@ -29,7 +27,7 @@ fn pre_integrated_light_on_the_head_is_near_the_reference() -> Outcome {
         ..Settings::default()
     };
     let listed = [("scatter".to_owned(), vec!["pre-integrated:1".into(), "pre-integrated:3".into()])];
-    let effort = Effort { batches: 8, samples: 1 };
+    let effort = Effort { light: RightLight::Surface(8), samples: 1 };
     let groups = chart::groups(Suite::Quick, &base, &listed, &[], effort)?;
     let options = Options { timing: None, folder: None, light: false };
     let report = chart::run(&mut studio, &base, &[scene], &groups, &options, &mut ())?;
@@ -44,9 +42,7 @@ fn pre_integrated_light_on_the_head_is_near_the_reference() -> Outcome {
 
 #[test]
 fn methods_are_steady_while_something_moves() -> Outcome {
-    if studio::adapters().is_empty() {
-        assert!(std::env::var_os("RUBOR_REQUIRE_GPU").is_none(), "RUBOR_REQUIRE_GPU is set: no adapter");
-        writeln!(std::io::stderr(), "SKIPPED: no graphics adapter").expect("stderr is open");
+    if !can_draw() {
         return Ok(());
     }
     let head = import::gltf::from_bytes(include_bytes!("../../assets/head.glb"), "head.glb".as_ref())?.head;
@@ -59,7 +55,8 @@ fn methods_are_steady_while_something_moves() -> Outcome {
     };
     let listed =
         [("scatter".to_owned(), vec!["none".into(), "separable:17".into(), "burley-disk:16".into()])];
-    let groups = chart::groups(Suite::Quick, &base, &listed, &[], Effort { batches: 1, samples: 1 })?;
+    let groups =
+        chart::groups(Suite::Quick, &base, &listed, &[], Effort { light: RightLight::Screen, samples: 1 })?;
     let sweeps: Vec<_> = stability::sweeps(&head, &rig, 4, 48)?
         .into_iter()
         .filter(|s| ["lamp-turns", "frown-weight"].contains(&s.name))

@@ -43,6 +43,23 @@ impl Leaf {
         flag
     }
 
+    /// The setting of a flag.
+    pub fn of_flag(flag: &str) -> Option<&'static Self> {
+        leaves().iter().find(|leaf| leaf.flag() == flag)
+    }
+
+    /// A change that [`Settings::overlay`] takes.
+    pub fn change(&self, value: &Value) -> Value {
+        let [group, field] = &self.path;
+        Value::Object([(group.clone(), serde_json::json!({ field: value }))].into_iter().collect())
+    }
+
+    /// Its value in settings that were written as JSON.
+    pub fn value_in<'a>(&self, settings: &'a Value) -> &'a Value {
+        let [group, field] = &self.path;
+        &settings[group][field]
+    }
+
     /// The JSON value of a text on the command line.
     ///
     /// # Errors
@@ -60,11 +77,8 @@ impl Leaf {
         } else {
             self.scalar(text)?
         };
-        let [group, field] = &self.path;
-        let change =
-            Value::Object([(group.clone(), serde_json::json!({ field: value }))].into_iter().collect());
         let mut settings = Settings::default();
-        settings.overlay(&change).and_then(|()| settings.validate()).map_err(|e| match e {
+        settings.overlay(&self.change(&value)).and_then(|()| settings.validate()).map_err(|e| match e {
             SettingsError::Range { found, expected, .. } => format!("found {found}, expected {expected}"),
             SettingsError::Json(message) => message,
         })?;
@@ -154,8 +168,7 @@ fn expected(schema: &Value, range: Option<[f64; 2]>) -> String {
 pub(super) fn check_ranges(settings: &Settings) -> Result<(), SettingsError> {
     let values = serde_json::to_value(settings).map_err(|e| SettingsError::Json(e.to_string()))?;
     for leaf in leaves() {
-        let [group, field] = &leaf.path;
-        let value = &values[group][field];
+        let value = leaf.value_in(&values);
         if let (Some([least, most]), Some(number)) = (leaf.range, value.as_f64())
             && !(least..=most).contains(&number)
         {
@@ -194,7 +207,7 @@ mod tests {
     #[test]
     fn wrong_texts_say_what_is_expected() {
         let wrong = |flag: &str, text: &str| {
-            let leaf = leaves().iter().find(|l| l.flag() == flag).expect("it is a setting");
+            let leaf = Leaf::of_flag(flag).expect("it is a setting");
             leaf.parse(text).expect_err("it is wrong")
         };
         assert!(wrong("size", "640").contains("WIDTHxHEIGHT"));

@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
+use rubor_renderer::settings::{Leaf, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::features::Features;
@@ -257,10 +258,9 @@ fn over(times: &[Times], features: &[Features], pair: impl Fn(usize) -> [[usize;
 }
 
 /// The value of a flag in settings.
-fn value_of(settings: &rubor_renderer::settings::Settings, flag: &str) -> Option<serde_json::Value> {
-    let leaf = rubor_renderer::settings::leaves().iter().find(|leaf| leaf.flag() == flag)?;
+fn value_of(settings: &Settings, flag: &str) -> Option<serde_json::Value> {
     let all = serde_json::to_value(settings).ok()?;
-    Some(all[&leaf.path[0]][&leaf.path[1]].clone())
+    Some(Leaf::of_flag(flag)?.value_in(&all).clone())
 }
 
 #[cfg(test)]

@@ -5,16 +5,13 @@
 //! bound --choose--> one of them in each scene --> bounds kept, time over the cheapest that keeps it
 //! ```
 
-use rubor_assets::compare::{Pixels, flip, mean_and_percentile};
-use rubor_renderer::channels::Channel;
 use rubor_renderer::settings::{AntialiasMethod, ScatterMethod, Settings};
 use rubor_rig::head::Head;
 use serde::Serialize;
 
 use super::{Auto, Bound, Chosen, Features, Outline};
 use crate::error::{Failure, Outcome};
-use crate::measure::chart::Scene;
-use crate::measure::difference::pixels;
+use crate::measure::chart::{Drawn, Measure, Scene, Truth, draw};
 use crate::report::{Adapter, AutoReport, AutoRow, median};
 use crate::studio::Studio;
 use crate::watch::Watch;
@@ -156,17 +153,16 @@ fn measure(
     };
     right.quality.scatter = ScatterMethod::Separable(65);
     right.quality.antialias = AntialiasMethod::Ssaa(8);
-    let mut truths: Vec<(Pixels, Vec<bool>)> = Vec::new();
-    for scene in scenes {
-        truths.push(truth(studio, scene, &right)?);
-    }
+    let truths: Vec<Truth> = scenes
+        .iter()
+        .map(|scene| Truth::draw(studio, &scene.shot, &right, Measure::Picture, base))
+        .collect::<Outcome<_>>()?;
     watch.begin("combinations", all.len() as u64);
     let mut errors = Vec::new();
     for settings in &all {
         let mut shown = Vec::new();
         for scene in scenes {
-            studio.cut(0);
-            shown.push(pixels(&studio.render(std::slice::from_ref(&scene.shot), 0.0, settings)?.image));
+            shown.push(draw(studio, &scene.shot, settings, false)?);
         }
         errors.push(flips(&shown, &truths));
         watch.step();
@@ -190,24 +186,9 @@ fn measure(
     Ok(Measured { features, combinations, errors, ms: times.into_iter().map(medians).collect() })
 }
 
-/// The right picture of a scene, and the pixels of the head and those around.
-fn truth(studio: &mut Studio, scene: &Scene, right: &Settings) -> Outcome<(Pixels, Vec<bool>)> {
-    let mut covered = right.clone();
-    covered.output.channels = vec![Channel::Radiance];
-    studio.cut(0);
-    let frame = studio.render(std::slice::from_ref(&scene.shot), 0.0, &covered)?;
-    let [radiance] = frame.channels.as_slice() else { return Err(Failure::job("the frame has no radiance")) };
-    let is_head: Vec<bool> = radiance.texels::<4>().map(|p| p[3] > 0.0).collect();
-    Ok((pixels(&frame.image), crate::measure::chart::head_pixels(&is_head, right)))
-}
-
 /// Mean FLIP of each picture, on all cores.
-fn flips(shown: &[Pixels], truths: &[(Pixels, Vec<bool>)]) -> Vec<f64> {
-    let of = |(shown, (right, counts)): (&Pixels, &(Pixels, Vec<bool>))| {
-        let map = flip::ldr(shown, right, flip::PIXELS_PER_DEGREE);
-        let counted: Vec<f32> = map.iter().zip(counts).filter(|(_, c)| **c).map(|(v, _)| *v).collect();
-        mean_and_percentile(&counted).0
-    };
+fn flips(shown: &[Drawn], truths: &[Truth]) -> Vec<f64> {
+    let of = |(shown, truth): (&Drawn, &Truth)| truth.error(shown).0.flip_mean;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let share = shown.len().div_ceil(cores).max(1);
     std::thread::scope(|scope| {

@@ -15,20 +15,20 @@
 pub mod calibration;
 pub mod experiment;
 mod features;
+pub mod measured;
 mod shots;
 
 use std::path::PathBuf;
 
-use rubor_renderer::settings::{Settings, leaves};
+use rubor_renderer::settings::{Leaf, Settings};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
 
 pub use calibration::Calibration;
 pub use features::{Features, Outline};
-pub use shots::{CALIBRATED, calibrated, random_shots};
+pub use shots::CALIBRATED;
 
-use crate::error::Outcome;
+use crate::error::{Failure, Outcome};
 use crate::measure::file_name;
 use crate::output;
 
@@ -37,6 +37,9 @@ const SHIPPED: &str = include_str!("h200.json");
 
 /// A choice stays while it keeps the bound, unless a cheaper one keeps this share of it.
 const HYSTERESIS: f64 = 0.85;
+
+/// Most combinations of choices that are tried for a frame.
+const MOST_COMBINATIONS: usize = 100_000;
 
 /// What limits a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,9 +98,6 @@ pub struct Auto {
     pub calibration: Calibration,
 }
 
-/// What counts first and second in a comparison; less is better.
-type Rank = fn(&Chosen) -> (f64, f64);
-
 /// What was chosen for a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
@@ -118,7 +118,7 @@ impl Calibration {
     /// # Errors
     /// It does not read, which a test excludes.
     pub fn shipped() -> Outcome<Self> {
-        serde_json::from_str(SHIPPED).map_err(crate::Failure::job)
+        serde_json::from_str(SHIPPED).map_err(Failure::job)
     }
 
     /// That of the best of some devices for which one was kept, else the one that ships.
@@ -153,74 +153,92 @@ fn kept_file(device: &str) -> Option<PathBuf> {
 }
 
 impl Auto {
+    /// Checks what a job says.
+    ///
+    /// # Errors
+    /// A bound that is not above 0, a setting that there is not, or more combinations than are tried.
+    pub fn check(&self) -> Outcome {
+        let wrong = |what: String, found: String, expected: &str| {
+            Err(Failure::input(format!("auto.{what}: found {found}, expected {expected}")))
+        };
+        let (Bound::Flip(most) | Bound::Milliseconds(most)) = self.bound;
+        if !(most > 0.0 && most.is_finite()) {
+            return wrong("bound".into(), most.to_string(), "a number above 0");
+        }
+        let groups = &self.calibration.groups;
+        for flag in self.held.iter().chain(groups.iter().map(|g| &g.flag)) {
+            if Leaf::of_flag(flag).is_none() {
+                return wrong("held and calibration.groups".into(), format!("{flag:?}"), "flags of settings");
+            }
+        }
+        let combinations = groups.iter().try_fold(1usize, |n, g| n.checked_mul(g.choices.len()));
+        if !combinations.is_some_and(|n| (1..=MOST_COMBINATIONS).contains(&n)) {
+            let found = combinations.map_or("more".into(), |n| n.to_string());
+            return wrong("calibration.groups".into(), found, "1 to 100000 combinations of choices");
+        }
+        Ok(())
+    }
+
+    /// Whether it chooses the setting of a flag.
+    pub fn chooses(&self, flag: &str) -> bool {
+        self.calibration.groups.iter().any(|g| g.flag == flag) && !self.held.iter().any(|h| h == flag)
+    }
+
+    /// Error and time of some choices, for heads with these features.
+    fn estimate(&self, choices: &[Option<usize>], heads: &[Features], size: [u32; 2]) -> Chosen {
+        let calibration = &self.calibration;
+        let base = heads.iter().map(|f| calibration.base_ms(f, size)).fold(0.0, f64::max);
+        let mut chosen = Chosen { choices: choices.to_vec(), flip: 0.0, milliseconds: base, is_kept: true };
+        for (g, choice) in choices.iter().enumerate().filter_map(|(g, c)| Some((g, (*c)?))) {
+            chosen.flip += heads.iter().map(|f| calibration.error(g, choice, f)).fold(0.0, f64::max);
+            chosen.milliseconds += heads.iter().map(|f| calibration.cost_ms(g, choice, f, size)).sum::<f64>();
+        }
+        chosen.is_kept = match self.bound {
+            Bound::Flip(most) => chosen.flip <= most,
+            Bound::Milliseconds(most) => chosen.milliseconds <= most,
+        };
+        chosen
+    }
+
     /// Choices for a frame after those of the frame before, for heads with these features.
     pub fn choose(&self, heads: &[Features], size: [u32; 2], before: Option<&Chosen>) -> Chosen {
-        let groups: Vec<Vec<Option<usize>>> = (self.calibration.groups.iter())
-            .map(|g| {
-                if self.held.contains(&g.flag) {
-                    vec![None]
-                } else {
-                    (0..g.choices.len()).map(Some).collect()
-                }
-            })
-            .collect();
-        // Every group on its own: errors and costs add up.
-        let table: Vec<Vec<(Option<usize>, f64, f64)>> = (groups.iter().enumerate())
-            .map(|(g, choices)| {
-                choices
-                    .iter()
-                    .map(|c| {
-                        let error = |f: &Features| c.map_or(0.0, |c| self.calibration.error(g, c, f));
-                        let cost = |f: &Features| c.map_or(0.0, |c| self.calibration.cost_ms(g, c, f, size));
-                        (*c, heads.iter().map(error).fold(0.0, f64::max), heads.iter().map(cost).sum())
-                    })
-                    .collect()
-            })
-            .collect();
-        let base: f64 = heads.iter().map(|f| self.calibration.base_ms(f, size)).fold(0.0, f64::max);
-        let mut all = vec![Chosen { choices: Vec::new(), flip: 0.0, milliseconds: base, is_kept: true }];
-        for group in &table {
-            let mut next = Vec::with_capacity(all.len() * group.len());
-            for chosen in &all {
-                for (choice, error, cost) in group {
-                    let mut chosen = chosen.clone();
-                    chosen.choices.push(*choice);
-                    chosen.flip += error;
-                    chosen.milliseconds += cost;
-                    next.push(chosen);
-                }
-            }
-            all = next;
+        // Errors and costs of groups add up, so what is slower and worse before a group is so after it.
+        let mut front = vec![Vec::new()];
+        let mut all = Vec::new();
+        for group in &self.calibration.groups {
+            let is_held = self.held.contains(&group.flag);
+            let choices = if is_held { vec![None] } else { (0..group.choices.len()).map(Some).collect() };
+            let longer =
+                front.iter().flat_map(|c| choices.iter().map(move |choice| [&c[..], &[*choice]].concat()));
+            all = longer.map(|c| self.estimate(&c, heads, size)).collect();
+            all.sort_by(|a, b| a.milliseconds.total_cmp(&b.milliseconds).then(a.flip.total_cmp(&b.flip)));
+            let mut least = f64::INFINITY;
+            all.retain(|c| {
+                let is_nearer = c.flip < least;
+                least = least.min(c.flip);
+                is_nearer
+            });
+            front = all.iter().map(|c| c.choices.clone()).collect();
         }
-        for chosen in &mut all {
-            chosen.is_kept = match self.bound {
-                Bound::Flip(most) => chosen.flip <= most,
-                Bound::Milliseconds(most) => chosen.milliseconds <= most,
-            };
-        }
-        let stays = before.and_then(|b| all.iter().find(|c| c.choices == b.choices && c.is_kept));
-        // What is better: cheaper under a bound of error, more exact under one of time; the nearest where nothing keeps it.
-        let (limit, better): (f64, Rank) = match self.bound {
-            Bound::Flip(most) => (most, |c| (c.milliseconds, c.flip)),
-            Bound::Milliseconds(most) => (most, |c| (c.flip, c.milliseconds)),
+        // Along the front the time rises and the error falls.
+        let [Some(fastest), Some(nearest)] = [all.first(), all.last()] else {
+            return self.estimate(&[], heads, size);
         };
-        let used = |c: &Chosen| if matches!(self.bound, Bound::Flip(_)) { c.flip } else { c.milliseconds };
-        let order = |a: &&Chosen, b: &&Chosen| {
-            let (a, b) = (better(a), better(b));
-            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+        let under = |share: f64| match self.bound {
+            Bound::Flip(most) => all.iter().find(|c| c.flip <= share * most),
+            Bound::Milliseconds(most) => all.iter().rfind(|c| c.milliseconds <= share * most),
         };
-        let share = if stays.is_some() { HYSTERESIS } else { 1.0 };
-        let best = all.iter().filter(|c| used(c) <= limit * share).min_by(order);
-        let chosen = match (stays, best) {
-            (Some(stays), Some(best)) if better(best).0 < better(stays).0 => best,
-            (Some(stays), _) => stays,
-            (None, Some(best)) => best,
-            (None, None) => match all.iter().min_by(|a, b| used(a).total_cmp(&used(b))) {
-                Some(nearest) => nearest,
-                None => return Chosen { choices: Vec::new(), flip: 0.0, milliseconds: base, is_kept: true },
-            },
+        let stays = before.map(|b| self.estimate(&b.choices, heads, size)).filter(|c| c.is_kept);
+        let Some(stays) = stays else {
+            return under(1.0)
+                .unwrap_or(if matches!(self.bound, Bound::Flip(_)) { nearest } else { fastest })
+                .clone();
         };
-        chosen.clone()
+        let is_better = |c: &&Chosen| match self.bound {
+            Bound::Flip(_) => c.milliseconds < stays.milliseconds,
+            Bound::Milliseconds(_) => c.flip < stays.flip,
+        };
+        under(HYSTERESIS).filter(is_better).cloned().unwrap_or(stays)
     }
 
     /// Settings with what was chosen.
@@ -230,9 +248,9 @@ impl Auto {
     pub fn settings(&self, base: &Settings, chosen: &Chosen) -> Outcome<Settings> {
         let mut settings = base.clone();
         for (group, choice) in self.calibration.groups.iter().zip(&chosen.choices) {
-            let leaf = leaves().iter().find(|leaf| leaf.flag() == group.flag);
+            let leaf = Leaf::of_flag(&group.flag);
             if let (Some(leaf), Some(choice)) = (leaf, choice.and_then(|c| group.choices.get(c))) {
-                settings.overlay(&json!({ &leaf.path[0]: { &leaf.path[1]: choice.value } }))?;
+                settings.overlay(&leaf.change(&choice.value))?;
             }
         }
         settings.validate()?;
@@ -320,6 +338,28 @@ mod tests {
             (before, last_free) = (Some(chosen), Some(alone));
         }
         assert!(changes <= 12 && changes < free, "{changes} changes, {free} without memory");
+    }
+
+    #[test]
+    fn jobs_with_impossible_wishes_are_refused() {
+        auto(Bound::Flip(0.02)).check().unwrap();
+        let refused = |change: fn(&mut Auto), phrase: &str| {
+            let mut auto = auto(Bound::Flip(0.02));
+            change(&mut auto);
+            let message = auto.check().unwrap_err().to_string();
+            assert!(message.contains(phrase), "{message}");
+        };
+        refused(|a| a.bound = Bound::Flip(-1.0), "found -1");
+        refused(|a| a.bound = Bound::Milliseconds(f64::NAN), "found NaN");
+        refused(|a| a.held.push("scater".into()), "scater");
+        refused(|a| a.calibration.groups.iter_mut().for_each(|g| g.choices.clear()), "found 0");
+        refused(
+            |a| {
+                let group = a.calibration.groups[0].clone();
+                a.calibration.groups.extend(std::iter::repeat_n(group, 60));
+            },
+            "found more",
+        );
     }
 
     #[test]

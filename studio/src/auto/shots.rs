@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::{Quat, Vec3};
-use rubor_renderer::settings::leaves;
+use rubor_renderer::settings::Leaf;
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::expression::Rig;
 use rubor_rig::framing::FaceFrame;
@@ -29,10 +29,9 @@ pub const CALIBRATED: &[(&str, &[&str])] = &[
 ///
 /// # Errors
 /// A value that a setting refuses, which a test excludes.
-pub fn calibrated() -> Outcome<Vec<(String, Vec<Value>)>> {
+pub(super) fn calibrated() -> Outcome<Vec<(String, Vec<Value>)>> {
     let value = |flag: &str, text: &str| {
-        let leaf = leaves().iter().find(|leaf| leaf.flag() == flag);
-        let leaf = leaf.ok_or_else(|| Failure::job(format!("there is no setting {flag}")))?;
+        let leaf = Leaf::of_flag(flag).ok_or_else(|| Failure::job(format!("there is no setting {flag}")))?;
         leaf.parse(text).map_err(Failure::job)
     };
     let of = |(flag, texts): &(&str, &[&str])| -> Outcome<(String, Vec<Value>)> {
@@ -46,7 +45,7 @@ pub fn calibrated() -> Outcome<Vec<(String, Vec<Value>)>> {
 ///
 /// # Errors
 /// A rig that does not fit the head.
-pub fn random_shots(head: &Head, rig: &Rig, count: usize, seed: u64) -> Outcome<Vec<Scene>> {
+pub(super) fn random_shots(head: &Head, rig: &Rig, count: usize, seed: u64) -> Outcome<Vec<Scene>> {
     let mut random = SplitMix64(seed);
     let origin = FaceFrame::of(head).origin;
     let all_expressions: Vec<&String> = rig.expressions.keys().collect();

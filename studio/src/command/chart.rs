@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use rubor::auto::calibration::Times;
-use rubor::auto::{self, Auto, Bound, Calibration, experiment};
-use rubor::measure::chart::{self, Effort, Measure, Options, Suite, Timing, page, plot::number};
+use rubor::auto::measured::{self, Measured};
+use rubor::auto::{Auto, Bound, Calibration, experiment};
+use rubor::measure::chart::{self, Effort, Measure, Options, RightLight, Suite, Timing, page, plot::number};
 use rubor::measure::stability;
 use rubor::report::{ChartError, ChartGroup, ChartReport, StabilityReport};
 use rubor::{Failure, Outcome, Report, Studio, Watch, inputs, output};
@@ -100,11 +100,10 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     if is_quick && !held.iter().chain(listed.iter().map(|(flag, _)| flag)).any(|flag| flag == "size") {
         base.output.size = QUICK_SIZE;
     }
-    let effort = Effort {
-        batches: arguments.batches.unwrap_or(batches),
-        samples: arguments.samples.unwrap_or(samples),
-    };
-    ScatterMethod::ReferenceSurface(effort.batches).validate().map_err(Failure::input)?;
+    let batches = arguments.batches.unwrap_or(batches);
+    ScatterMethod::ReferenceSurface(batches).validate().map_err(Failure::input)?;
+    let effort =
+        Effort { light: RightLight::Surface(batches), samples: arguments.samples.unwrap_or(samples) };
     if arguments.calibrate {
         return calibrate(arguments, &mut studio, &loaded.head, &rig, &base, is_quick);
     }
@@ -124,6 +123,12 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         let sweeps = stability::sweeps(&loaded.head, &rig, steps, width.min(height))?;
         let options = stability::Options { samples: effort.samples.min(4), frames };
         let groups: Vec<_> = groups.into_iter().filter(|g| MOVING.contains(&g.flag.as_str())).collect();
+        if groups.is_empty() {
+            let expected = format!("several values of one of --{}", MOVING.join(", --"));
+            return Err(Failure::input(format!(
+                "--stability: found nothing that may flicker, expected {expected}"
+            )));
+        }
         let report =
             stability::run(&mut studio, &loaded.head, &base, &sweeps, &groups, options, &mut progress);
         progress.end();
@@ -140,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         console::notes(&notes);
         scenes = found;
     }
-    let timing = Timing { rounds: arguments.rounds, warm_up: frames.div_ceil(2), frames };
+    let timing = timing(arguments.rounds, frames);
     let options = Options {
         timing: Some(timing).filter(|t| t.frames > 0),
         folder: arguments.output.clone(),
@@ -177,9 +182,6 @@ fn draw_again(path: &Path, folder: &Path) -> Outcome {
     }
 }
 
-/// Seed of the random shots.
-const SEED: u64 = 1;
-
 fn calibrate(
     arguments: &Arguments,
     studio: &mut Studio,
@@ -188,34 +190,17 @@ fn calibrate(
     base: &Settings,
     is_quick: bool,
 ) -> Outcome {
-    let shots = arguments.shots.unwrap_or(if is_quick { 24 } else { 64 }) as usize;
-    let scenes = auto::random_shots(head, rig, shots, SEED)?;
-    let listed = auto::calibrated()?;
-    // Right is the best that a frame in one go can reach.
-    let effort = Effort { batches: 0, samples: arguments.samples.unwrap_or(if is_quick { 4 } else { 8 }) };
-    let groups = chart::groups(Suite::Whole, base, &listed, &[], effort)?;
-    let frames = arguments.frames.unwrap_or(if is_quick { 2 } else { 20 });
-    let timing = Timing { rounds: arguments.rounds, warm_up: frames.div_ceil(2), frames };
-    studio.set_heads([head])?;
+    let [shots, samples, frames] = if is_quick { [24, 4, 2] } else { [64, 8, 20] };
+    let options = measured::Options {
+        shots: arguments.shots.unwrap_or(shots) as usize,
+        samples: arguments.samples.unwrap_or(samples),
+        timing: timing(arguments.rounds, arguments.frames.unwrap_or(frames)),
+        large: if is_quick { [256, 256] } else { [1280, 720] },
+    };
     let mut progress = Progress::default();
-    let options = Options { timing: None, folder: None, light: false };
-    let report = chart::run(studio, base, &scenes, &groups, &options, &mut progress);
+    let measured = measured::run(studio, head, rig, base, &options, &mut progress);
     progress.end();
-    let report = report?;
-    // Times in two sizes: what a pixel costs, and what a frame costs without any.
-    let mut times = Vec::new();
-    for size in [base.output.size, if is_quick { [256, 256] } else { [1280, 720] }] {
-        let mut sized = base.clone();
-        sized.output.size = size;
-        let groups = chart::groups(Suite::Whole, &sized, &listed, &[], effort)?;
-        let ms = chart::times(studio, &scenes, &groups, timing, &mut progress);
-        progress.end();
-        times.push(Times { size, ms: ms? });
-    }
-    let outline = auto::Outline::of(head);
-    let features: Vec<_> = scenes.iter().map(|s| outline.features(&s.shot, base.output.size)).collect();
-    let calibration = Calibration::of(&report, &features, &times)
-        .ok_or_else(|| Failure::job("the shots do not suffice for estimates").hint("more --shots"))?;
+    let Measured { calibration, features, report } = measured?;
     let kept = calibration.keep()?;
     if let Some(folder) = &arguments.output {
         output::folder(folder)?;
@@ -231,6 +216,10 @@ fn calibrate(
         None => say!("not kept: this system names no folder for data"),
     }
     Ok(())
+}
+
+fn timing(rounds: u32, frames: u32) -> Timing {
+    Timing { rounds, warm_up: frames.div_ceil(2), frames }
 }
 
 /// Bounds under which choices are judged.

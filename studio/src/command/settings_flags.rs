@@ -12,7 +12,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command};
 use rubor::measure::product;
 use rubor::{Failure, Outcome};
 use rubor_renderer::settings::{Leaf, Preset, Settings, leaves};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 /// The flags of a command.
 pub(crate) trait Purpose {
@@ -96,11 +96,6 @@ fn parse(leaf: &Leaf, text: &str, lists: bool) -> Result<Vec<Value>, String> {
     text.split(',').map(|t| leaf.parse(t.trim())).collect()
 }
 
-fn change(leaf: &Leaf, value: &Value) -> Value {
-    let [group, field] = &leaf.path;
-    json!({ group: { field: value } })
-}
-
 impl<P: Purpose> SettingsFlags<P> {
     fn default_text(flag: &Flag) -> String {
         let own = P::DEFAULTS.iter().find(|(name, _)| *name == flag.name);
@@ -138,7 +133,7 @@ impl<P: Purpose> SettingsFlags<P> {
                     .map_err(|e| Failure::job(format!("the default of --{name}: {e}")))?,
                 _ => continue,
             };
-            lists.push(values.iter().map(|value| change(flag.leaf, value)).collect());
+            lists.push(values.iter().map(|value| flag.leaf.change(value)).collect());
         }
         Ok(lists)
     }
@@ -156,7 +151,7 @@ impl<P: Purpose> SettingsFlags<P> {
     /// Puts the flags that were given over settings.
     pub(crate) fn overlay(&self, settings: &mut Settings) -> Outcome {
         for (leaf, values) in &self.given {
-            values.iter().try_for_each(|value| settings.overlay(&change(leaf, value)))?;
+            values.iter().try_for_each(|value| settings.overlay(&leaf.change(value)))?;
         }
         Ok(settings.validate()?)
     }
@@ -185,7 +180,7 @@ impl<P: Purpose> SettingsFlags<P> {
             let own = P::DEFAULTS.iter().find(|(name, _)| *name == leaf.flag());
             let values = own.and_then(|(_, text)| parse(leaf, text, P::LISTS).ok()).unwrap_or_default();
             if let [value] = &values[..] {
-                base.overlay(&change(leaf, value))?;
+                base.overlay(&leaf.change(value))?;
             }
         }
         let (held, listed): (Vec<_>, Vec<_>) = self.given.iter().partition(|(_, values)| values.len() == 1);
@@ -301,7 +296,7 @@ mod tests {
             let long = format!("--{}", flag.name);
             let settings = parsed::<One>(&[&long, text]).unwrap().settings(None).unwrap();
             let mut expected = Settings::default();
-            expected.overlay(&change(flag.leaf, &flag.leaf.parse(text).unwrap())).unwrap();
+            expected.overlay(&flag.leaf.change(&flag.leaf.parse(text).unwrap())).unwrap();
             assert_eq!(settings, expected, "{long} {text}");
         }
     }

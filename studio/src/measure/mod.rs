@@ -34,9 +34,9 @@ pub fn product(base: &Settings, lists: &[Vec<Value>]) -> crate::Outcome<Vec<Sett
 /// A name for each of several settings: the values of the flags in `always`, and of those that differ.
 pub(crate) fn names(all: &[Settings], always: &[&str]) -> Vec<String> {
     let values: Vec<Value> = all.iter().map(|s| serde_json::to_value(s).unwrap_or_default()).collect();
-    let of = |value: &Value, leaf: &Leaf| value[&leaf.path[0]][&leaf.path[1]].clone();
+    let of = |value: &Value, leaf: &Leaf| leaf.value_in(value).clone();
     let differs = |leaf: &Leaf| values.windows(2).any(|pair| of(&pair[0], leaf) != of(&pair[1], leaf));
-    let first = always.iter().filter_map(|flag| leaves().iter().find(|leaf| leaf.flag() == *flag));
+    let first = always.iter().filter_map(|flag| Leaf::of_flag(flag));
     let then = leaves().iter().filter(|leaf| !always.contains(&leaf.flag().as_str()) && differs(leaf));
     let leaves: Vec<&Leaf> = first.chain(then).collect();
     let text = |leaf: &Leaf, value: Value| match value {

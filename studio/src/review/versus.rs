@@ -13,7 +13,7 @@ use clap::ValueEnum;
 use image::RgbImage;
 use rubor_assets::files;
 
-use super::page::{self, Cost, Curve, PAGE_FILE, PageData, rounded};
+use super::page::{self, Curve, PAGE_FILE, PageData, rounded};
 use super::text;
 use super::video::{self, Video};
 use crate::error::{Failure, Outcome};
@@ -132,23 +132,7 @@ fn plain(folder: &Path, frames: Vec<u32>, notes: &mut Vec<Note>) -> Outcome<Page
             (USUAL_FPS, page::title(folder))
         }
     };
-    Ok(PageData {
-        id,
-        title: page::title(folder),
-        folder: String::new(),
-        fps,
-        size: [width, height],
-        frames,
-        curves: Vec::new(),
-        marks: Vec::new(),
-        inset: None,
-        settings: Vec::new(),
-        facts: Vec::new(),
-        cost: Cost::default(),
-        notes: Vec::new(),
-        files: Vec::new(),
-        second: None,
-    })
+    Ok(PageData { id, title: page::title(folder), fps, size: [width, height], frames, ..PageData::default() })
 }
 
 /// The frames that stand for each other: those of one number where both runs have one rate, else those of one time.
@@ -388,23 +372,7 @@ mod tests {
 
     #[test]
     fn frames_are_paired_by_number_or_by_time() {
-        let run = |fps: f64, frames: Vec<u32>| PageData {
-            id: String::new(),
-            title: String::new(),
-            folder: String::new(),
-            fps,
-            size: [1, 1],
-            frames,
-            curves: Vec::new(),
-            marks: Vec::new(),
-            inset: None,
-            settings: Vec::new(),
-            facts: Vec::new(),
-            cost: Cost::default(),
-            notes: Vec::new(),
-            files: Vec::new(),
-            second: None,
-        };
+        let run = |fps: f64, frames: Vec<u32>| PageData { fps, size: [1, 1], frames, ..PageData::default() };
         let of = |a: &PageData, b: &PageData| -> Vec<[u32; 2]> {
             pairs(a, b).iter().map(|pair| [pair.first, pair.second]).collect()
         };

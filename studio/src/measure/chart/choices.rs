@@ -6,11 +6,11 @@
 
 use rubor_renderer::settings::{
     AntialiasMethod, ColorMethod, DetailMethod, Leaf, RasterMethod, ScatterMethod, Settings, TransmitMethod,
-    WrinkleMethod, leaves,
+    WrinkleMethod,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::suite::Suite;
 use crate::error::{Failure, Outcome};
@@ -26,14 +26,22 @@ pub enum Measure {
     Picture,
 }
 
-/// The effort of truths.
+/// What counts as right, and how much is spent on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Effort {
-    /// Batches of 65 536 samples of `reference-surface`; 0 takes `reference-screen` and `shadow-depth` as right, the best that a
-    /// frame in one go can reach.
-    pub batches: u32,
+    /// Light in skin.
+    pub light: RightLight,
     /// Samples on a side of a pixel for antialiasing.
     pub samples: u32,
+}
+
+/// Light in skin that counts as right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RightLight {
+    /// `reference-surface` with so many batches of 65 536 samples: as exact as time allows, with noise.
+    Surface(u32),
+    /// `reference-screen` and `shadow-depth`: the best that a frame in one go can reach. The measure is the picture.
+    Screen,
 }
 
 /// Choices that differ in one setting.
@@ -79,54 +87,28 @@ const METHODS: &[(&str, &[&str], &[&str])] = &[
 fn truth(flag: &str, base: &Settings, effort: Effort) -> Option<(Measure, Settings)> {
     let mut right = base.clone();
     let quality = &mut right.quality;
-    let measure = match flag {
-        "transmit" if effort.batches == 0 => {
-            quality.transmit = TransmitMethod::ShadowDepth;
-            Measure::Picture
-        }
-        "scatter" if effort.batches == 0 => {
-            quality.scatter = ScatterMethod::ReferenceScreen;
-            Measure::Picture
-        }
-        // The integral over the surface includes the light from behind.
-        "scatter" | "transmit" | "curvature" => {
-            quality.scatter = ScatterMethod::ReferenceSurface(effort.batches);
+    match (flag, effort.light) {
+        ("scatter" | "transmit" | "curvature", RightLight::Surface(batches)) => {
+            quality.scatter = ScatterMethod::ReferenceSurface(batches);
+            // The integral over the surface includes the light from behind.
             quality.transmit = TransmitMethod::None;
-            Measure::Light
+            return Some((Measure::Light, right));
         }
-        "wrinkles" => {
-            quality.wrinkles = WrinkleMethod::PartialDerivative;
-            Measure::Picture
-        }
-        "color" => {
-            quality.color = ColorMethod::Hemoglobin;
-            Measure::Picture
-        }
-        "antialias" => {
-            quality.antialias = AntialiasMethod::Ssaa(effort.samples);
-            Measure::Picture
-        }
-        "detail" => {
-            quality.detail = DetailMethod::Full;
-            Measure::Picture
-        }
-        "raster" => {
-            quality.raster = RasterMethod::Hardware;
-            Measure::Picture
-        }
+        ("scatter" | "curvature", RightLight::Screen) => quality.scatter = ScatterMethod::ReferenceScreen,
+        ("transmit", RightLight::Screen) => quality.transmit = TransmitMethod::ShadowDepth,
+        ("wrinkles", _) => quality.wrinkles = WrinkleMethod::PartialDerivative,
+        ("color", _) => quality.color = ColorMethod::Hemoglobin,
+        ("antialias", _) => quality.antialias = AntialiasMethod::Ssaa(effort.samples),
+        ("detail", _) => quality.detail = DetailMethod::Full,
+        ("raster", _) => quality.raster = RasterMethod::Hardware,
         _ => return None,
-    };
-    Some((measure, right))
-}
-
-fn change(leaf: &Leaf, value: &Value) -> Value {
-    let [group, field] = &leaf.path;
-    json!({ group: { field: value } })
+    }
+    Some((Measure::Picture, right))
 }
 
 fn leaf(flag: &str) -> Outcome<&'static Leaf> {
-    let found = leaves().iter().find(|leaf| leaf.flag() == flag);
-    found.ok_or_else(|| Failure::input(format!("found {flag:?}, expected the name of a setting")))
+    Leaf::of_flag(flag)
+        .ok_or_else(|| Failure::input(format!("found {flag:?}, expected the name of a setting")))
 }
 
 /// Changes of the base for a row of [`METHODS`].
@@ -138,7 +120,7 @@ fn parse(flag: &str, text: &str) -> Outcome<Vec<Value>> {
         .into_iter()
         .chain(rest)
         // Not checked alone: one may only be possible with the other.
-        .map(|(flag, value)| Ok(change(leaf(flag)?, &value.into())))
+        .map(|(flag, value)| Ok(leaf(flag)?.change(&value.into())))
         .collect()
 }
 
@@ -167,7 +149,7 @@ pub fn groups(
     } else {
         let of = |(flag, values): &(String, Vec<Value>)| -> Outcome<(String, Vec<Vec<Value>>)> {
             let leaf = leaf(flag)?;
-            Ok((flag.clone(), values.iter().map(|value| vec![change(leaf, value)]).collect()))
+            Ok((flag.clone(), values.iter().map(|value| vec![leaf.change(value)]).collect()))
         };
         listed.iter().map(of).collect::<Outcome<_>>()?
     };
@@ -180,6 +162,7 @@ pub fn groups(
             settings.validate()?;
             choices.push(settings);
         }
+        choices.dedup();
         if choices.len() < 2 {
             continue;
         }
@@ -198,6 +181,10 @@ pub fn groups(
         let choices = choices.into_iter().map(|choice| (name(&choice), choice)).collect();
         groups.push(Group { flag, measure, truth, choices });
     }
+    if groups.is_empty() {
+        let expected = "expected several values of a setting, or one that no flag holds";
+        return Err(Failure::input(format!("chart: found nothing to compare, {expected}")));
+    }
     Ok(groups)
 }
 
@@ -207,7 +194,7 @@ mod tests {
 
     use super::*;
 
-    const EFFORT: Effort = Effort { batches: 2, samples: 2 };
+    const EFFORT: Effort = Effort { light: RightLight::Surface(2), samples: 2 };
 
     #[test]
     fn every_group_of_methods_is_charted_or_a_matter_of_taste() {
@@ -243,6 +230,9 @@ mod tests {
         assert_eq!(names[1], ["shadow-size 64", "shadow-size 128", "shadow-size 256"]);
         assert_eq!(found[1].truth.quality.shadow_size, 256, "the last one is right");
         assert_eq!(found[0].truth.quality.scatter, ScatterMethod::ReferenceSurface(2));
+        let twice = [("scatter".to_owned(), vec!["none".into(), "none".into()])];
+        let message = groups(Suite::Quick, &base, &twice, &[], EFFORT).unwrap_err().to_string();
+        assert!(message.contains("nothing to compare"), "{message}");
         let held = groups(Suite::Quick, &base, &[], &["scatter".to_owned()], EFFORT).unwrap();
         assert!(!held.iter().any(|g| g.flag == "scatter") && held.iter().any(|g| g.flag == "antialias"));
     }

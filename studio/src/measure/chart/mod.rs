@@ -21,10 +21,10 @@ use std::path::{Path, PathBuf};
 
 use rubor_renderer::settings::{ScatterMethod, Settings};
 
-pub use choices::{Effort, Group, Measure, groups};
+pub use choices::{Effort, Group, Measure, RightLight, groups};
 pub use suite::{Scene, Suite, scene_of, scenes};
-pub(crate) use truth::head_pixels;
-use truth::{Truth, draw, save_light};
+use truth::save_light;
+pub(crate) use truth::{Drawn, SETTLED_FRAMES, Truth, draw};
 
 use super::file_name;
 use crate::error::Outcome;

@@ -18,16 +18,16 @@ use crate::report::ChartError;
 use crate::studio::{Frame, Studio};
 
 /// Frames of a still scene after which antialiasing over time changes no more.
-const SETTLED_FRAMES: u32 = 4;
+pub(crate) const SETTLED_FRAMES: u32 = 4;
 
 /// A frame with its diffuse light before albedo and the strength of scattering, where they were asked for.
-pub(super) struct Drawn {
-    pub(super) frame: Frame,
+pub(crate) struct Drawn {
+    pub(crate) frame: Frame,
     pub(super) diffuse: Vec<[f32; 4]>,
 }
 
 /// Draws a scene with settings; with `light` its diffuse light too.
-pub(super) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light: bool) -> Outcome<Drawn> {
+pub(crate) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light: bool) -> Outcome<Drawn> {
     let mut settings = settings.clone();
     settings.output.channels = if light { vec![Channel::Diffuse, Channel::Albedo] } else { Vec::new() };
     let shots = std::slice::from_ref(shot);
@@ -49,7 +49,7 @@ pub(super) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light:
 }
 
 /// A scene as it should be.
-pub(super) struct Truth {
+pub(crate) struct Truth {
     /// The right picture.
     pub(super) frame: Frame,
     pixels: Pixels,
@@ -69,7 +69,7 @@ struct Skin {
 
 impl Truth {
     /// Draws the truth of a group in a scene.
-    pub(super) fn draw(
+    pub(crate) fn draw(
         studio: &mut Studio,
         shot: &Shot,
         settings: &Settings,
@@ -114,7 +114,7 @@ impl Truth {
     }
 
     /// How far a choice is from it, and its map of visible differences.
-    pub(super) fn error(&self, test: &Drawn) -> (ChartError, Vec<f32>) {
+    pub(crate) fn error(&self, test: &Drawn) -> (ChartError, Vec<f32>) {
         let map = flip::ldr(&pixels(&test.frame.image), &self.pixels, flip::PIXELS_PER_DEGREE);
         let counted: Vec<f32> =
             map.iter().zip(&self.counts).filter(|(_, counts)| **counts).map(|(v, _)| *v).collect();
@@ -164,7 +164,7 @@ fn samples(marks: &[bool], settings: &Settings) -> Vec<(bool, bool)> {
 }
 
 /// Pixels of the picture that show a head or lie beside one, from marks of samples.
-pub(crate) fn head_pixels(is_head: &[bool], settings: &Settings) -> Vec<bool> {
+fn head_pixels(is_head: &[bool], settings: &Settings) -> Vec<bool> {
     let any: Vec<bool> = samples(is_head, settings).into_iter().map(|(_, any)| any).collect();
     grown(&any, settings.output.size[0] as usize)
 }

@@ -18,7 +18,7 @@ use rubor_rig::head::Head;
 
 pub use sweeps::{Step, Sweep, sweeps};
 
-use super::chart::Group;
+use super::chart::{Group, SETTLED_FRAMES};
 use super::difference::pixels;
 use crate::error::{Failure, Outcome};
 use crate::report::{StabilityReport, StabilityRow, SweepReport, median};
@@ -33,9 +33,6 @@ pub struct Options {
     /// Timed frames of each step; 0 times nothing.
     pub frames: u32,
 }
-
-/// Frames of a still scene after which antialiasing over time changes no more.
-const SETTLED_FRAMES: u32 = 4;
 
 /// A picture with what its measures need.
 struct Shown {

@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use rubor_renderer::settings::{Settings, leaves};
+use rubor_renderer::settings::{Leaf, leaves};
 use rubor_rig::limits;
 use rubor_rig::timeline::Track;
 use serde::{Deserialize, Serialize};
@@ -20,6 +20,7 @@ use serde_json::Value;
 use super::inset::{self, Inset};
 use super::marks::{self, Mark};
 use crate::error::{Failure, Outcome};
+use crate::job::Job;
 use crate::output;
 use crate::plan::Plan;
 use crate::report::JobReport;
@@ -42,7 +43,7 @@ const DATA_START: &str = r#"<script id="data" type="application/json">"#;
 const DATA_END: &str = "</script>";
 
 /// What a page shows of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct PageData {
     /// Changes with anything that decides pixels; notes are kept under it.
@@ -151,7 +152,7 @@ impl PageData {
             curves: curves(plan, frames),
             marks: marks::of(&job.sequence),
             inset: inset.map(|(map, inset)| inset_place(map, inset.place(size))),
-            settings: settings(&job.settings),
+            settings: settings(job),
             facts: facts(report),
             cost: cost(frames, costs),
             notes: report.notes.clone(),
@@ -271,7 +272,8 @@ fn inset_place(map: inset::Map, rect: [u32; 4]) -> InsetPlace {
     InsetPlace { name: name.into(), about: about.into(), rect }
 }
 
-fn settings(settings: &Settings) -> Vec<(String, String)> {
+/// Names and values; of what is chosen frame by frame, that it is.
+fn settings(job: &Job) -> Vec<(String, String)> {
     fn text(value: &Value) -> String {
         match value {
             Value::String(text) => text.clone(),
@@ -284,8 +286,10 @@ fn settings(settings: &Settings) -> Vec<(String, String)> {
             other => other.to_string(),
         }
     }
-    let value = serde_json::to_value(settings).unwrap_or_default();
-    leaves().iter().map(|leaf| (leaf.name(), text(&value[&leaf.path[0]][&leaf.path[1]]))).collect()
+    let all = serde_json::to_value(&job.settings).unwrap_or_default();
+    let is_chosen = |leaf: &Leaf| job.auto.as_ref().is_some_and(|auto| auto.chooses(&leaf.flag()));
+    let value = |leaf: &Leaf| if is_chosen(leaf) { "by need".to_owned() } else { text(leaf.value_in(&all)) };
+    leaves().iter().map(|leaf| (leaf.name(), value(leaf))).collect()
 }
 
 fn facts(report: &JobReport) -> Vec<(String, String)> {
@@ -300,6 +304,7 @@ fn facts(report: &JobReport) -> Vec<(String, String)> {
     if let Some(seconds) = report.seconds_per_frame {
         facts.push(("seconds a frame, median".into(), format!("{seconds:.3}")));
     }
+    facts.extend(report.auto.iter().map(|run| (format!("frames {}", run.frames), run.chosen.clone())));
     let passes = report.gpu_milliseconds_per_pass.iter();
     facts.extend(passes.map(|(name, ms)| (format!("{name}, median"), format!("{ms:.3} ms"))));
     facts
@@ -326,7 +331,6 @@ mod tests {
         PageData {
             id: "0".into(),
             title: "</script><b>{{script}} \u{2028}".into(),
-            folder: String::new(),
             fps: 24.0,
             size: [64, 48],
             frames: vec![1, 2, 5],
@@ -337,14 +341,9 @@ mod tests {
                 values: vec![Some(0.0), Some(0.5), None],
                 keys: vec![1, 5],
             }],
-            marks: Vec::new(),
-            inset: None,
-            settings: settings(&Settings::default()),
-            facts: Vec::new(),
-            cost: Cost::default(),
-            notes: Vec::new(),
+            settings: vec![("quality.scatter".into(), "none".into())],
             files: vec!["video.mp4".into()],
-            second: None,
+            ..PageData::default()
         }
     }
 
