@@ -29,6 +29,10 @@ def empty(width, height, samples):
     scene.render.image_settings.color_depth = "32"
     scene.world = bpy.data.worlds.new("black")
     scene.world.color = (0, 0, 0)
+    # A new world may have a grey background of its own.
+    for node in scene.world.node_tree.nodes if scene.world.node_tree else ():
+        if node.type == "BACKGROUND":
+            node.inputs["Strength"].default_value = 0
     cycles = scene.cycles
     cycles.device = "CPU"
     cycles.samples = samples

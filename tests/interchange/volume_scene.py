@@ -4,6 +4,7 @@ Folder of a scene: scene.json, surface.ply, blockers.ply, and pictures of f32 (r
 """
 
 import json
+import sys
 from pathlib import Path
 
 import numpy
@@ -99,3 +100,30 @@ def write(scene, program, passes, rows):
             print(f"{scene.name}, {program}: relative RMSE {row['relativeRmse']}, {row['overNoise']} times the noise", flush=True)
         elif row["patch"] == "all":
             print(f"{scene.name}, {program}, {row['channel']}: {row['ratio']} +- {row['interval95']}", flush=True)
+
+
+def table(folder):
+    """All comparisons below a folder as agreement.csv, and how many of them agree."""
+    lines = ["program,still,patch,channel,pixels,ratio,interval95,over_noise"]
+    agreeing, all_ratios = {}, {}
+    for file in sorted(Path(folder).glob("*/*.json")):
+        if file.name not in ("mitsuba.json", "cycles.json"):
+            continue
+        for row in json.loads(file.read_text()):
+            head = [row["program"], row["scene"], row["patch"], row.get("channel", ""), row["pixels"]]
+            if row["patch"] == "pixels":
+                lines.append(",".join(map(str, [*head, "", "", row["overNoise"]])))
+                continue
+            lines.append(",".join(map(str, [*head, row["ratio"], row["interval95"], ""])))
+            agreeing.setdefault(row["program"], []).append(row["agrees"])
+            if row["patch"] == "all":
+                all_ratios.setdefault(row["program"], []).append(row["ratio"])
+    (Path(folder) / "agreement.csv").write_text("\n".join(lines) + "\n")
+    for program, agrees in agreeing.items():
+        ratios = all_ratios[program]
+        mean = sum(ratios) / len(ratios)
+        print(f"{program}: {sum(agrees)} of {len(agrees)} intervals of 95 % hold 1, mean ratio of pictures {mean:.4f}")
+
+
+if __name__ == "__main__":
+    table(sys.argv[1])

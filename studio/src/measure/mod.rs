@@ -4,6 +4,7 @@ pub mod bench;
 pub mod chart;
 pub mod difference;
 pub mod stability;
+pub mod volume;
 
 use rubor_assets::files::plain_names;
 use rubor_renderer::settings::{Leaf, Settings, leaves};

@@ -52,12 +52,6 @@ impl Lamp {
         }
     }
 
-    /// Whether a place gets all of the light: it is no spot, or the place is inside of the inner cone.
-    pub fn is_whole_at(&self, place_mm: Vec3) -> bool {
-        self.kind != LightKind::Spot
-            || (place_mm - self.position_mm).normalize_or_zero().dot(self.axis) >= self.cone[0]
-    }
-
     /// Light from the place `at` of its disk, two numbers from 0 to 1; (0, 0) is the middle.
     pub(super) fn arriving(&self, place_mm: Vec3, at: [f32; 2]) -> Arriving {
         let (sin, cos) = (TAU * at[1]).sin_cos();

@@ -20,7 +20,7 @@ use rubor_rig::skin::volume::{Flesh, Lamp, Masking};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::error::Outcome;
+use crate::error::{Failure, Outcome};
 use crate::studio::{DISTANT_LAMP_RADIUS, LAMP_RADIUS_METRES};
 
 /// Index of refraction of skin.
@@ -65,7 +65,7 @@ impl MediumName {
             Self::Skin1 => SKIN1,
             Self::Skin2 => SKIN2,
         };
-        Ok(rgb_media(&coefficients, ETA)?)
+        rgb_media(&coefficients, ETA).map_err(Failure::input)
     }
 
     /// The volume.
@@ -73,7 +73,7 @@ impl MediumName {
     /// # Errors
     /// As [`MediumName::media`].
     pub fn flesh(self) -> Outcome<Flesh> {
-        Ok(Flesh::new(&self.media()?, BOUNDARY[1], Masking::Separable)?)
+        Flesh::new(&self.media()?, BOUNDARY[1], Masking::Separable).map_err(Failure::input)
     }
 
     /// The volume of scenes for other programs, and its roughness.
@@ -81,7 +81,8 @@ impl MediumName {
     /// # Errors
     /// As [`MediumName::media`].
     pub fn exported_flesh(self, masking: Masking) -> Outcome<(Flesh, f64)> {
-        Ok((Flesh::new(&self.media()?, EXPORTED_ROUGHNESS, masking)?, EXPORTED_ROUGHNESS))
+        let flesh = Flesh::new(&self.media()?, EXPORTED_ROUGHNESS, masking).map_err(Failure::input)?;
+        Ok((flesh, EXPORTED_ROUGHNESS))
     }
 
     /// Settings of methods in real time: the profile of this medium by a photon walk, nothing but light in skin.
@@ -90,7 +91,7 @@ impl MediumName {
     /// As [`MediumName::media`].
     pub fn settings(self, base: &Settings) -> Outcome<Settings> {
         let name = format!("{}-monte-carlo", self.name());
-        let profile = ProfileModel::MonteCarlo.profile(&name, &self.media()?, None, PHOTONS)?;
+        let profile = ProfileModel::MonteCarlo.profile(&name, &self.media()?, None, PHOTONS).map_err(Failure::input)?;
         let mut settings = base.clone();
         let quality = &mut settings.quality;
         quality.profile = DiffusionProfile::from(profile);
@@ -136,8 +137,7 @@ pub fn bare_shot(shot: &Shot) -> Shot {
     bare
 }
 
-/// The lamps of a shot, as wide as the renderer makes them, or as points.
-pub fn lamps(shot: &Shot, wide: bool) -> Vec<Lamp> {
-    let [radius, tangent] = if wide { [LAMP_RADIUS_METRES, DISTANT_LAMP_RADIUS] } else { [0.0; 2] };
-    shot.lights.iter().map(|state| Lamp::new(state, radius, tangent)).collect()
+/// The lamps of a shot, as wide as the renderer makes them.
+pub fn lamps(shot: &Shot) -> Vec<Lamp> {
+    shot.lights.iter().map(|state| Lamp::new(state, LAMP_RADIUS_METRES, DISTANT_LAMP_RADIUS)).collect()
 }
