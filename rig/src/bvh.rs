@@ -190,7 +190,8 @@ impl Bvh {
             let children = [index + 1, node.start];
             let [a, b] = children.map(|child| ray.enters(&self.nodes[child as usize], far));
             // The nearer child is taken first.
-            let order = if a.unwrap_or(f32::INFINITY) <= b.unwrap_or(f32::INFINITY) { [1, 0] } else { [0, 1] };
+            let order =
+                if a.unwrap_or(f32::INFINITY) <= b.unwrap_or(f32::INFINITY) { [1, 0] } else { [0, 1] };
             for i in order {
                 if let Some(enters) = [a, b][i] {
                     stack[depth] = (children[i], enters);
@@ -210,8 +211,7 @@ mod tests {
     #[test]
     fn agrees_with_testing_every_triangle() {
         let mut random = SplitMix64(1);
-        let mut vector =
-            |scale: f32| Vec3::from_array([0; 3].map(|_| random.uniform() as f32 - 0.5)) * scale;
+        let mut vector = |scale: f32| Vec3::from_array([0; 3].map(|_| random.uniform() as f32 - 0.5)) * scale;
         let triangles: Vec<[Vec3; 3]> = (0..400)
             .map(|_| {
                 let center = vector(2.0);

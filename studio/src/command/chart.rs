@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     /// visible differences; with --sequence the diffuse light too (EXR)
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Draw the page of a chart that was measured before: its chart.json
+    /// Draw the page of a chart that was measured before: its chart.json or volume.json
     #[arg(long, value_name = "FILE", requires = "output", conflicts_with_all = ["sequence", "head", "stability", "calibrate", "auto"])]
     from: Option<PathBuf>,
     /// In place of time and error: what methods do while one quantity moves in small steps (stability.svg, .csv, .json)
@@ -243,17 +243,13 @@ fn measure_volume(
     ScatterMethod::ReferenceSurface(batches).validate().map_err(Failure::input)?;
     let base = medium.settings(base)?;
     let choices = volume::choices(&base, listed, batches)?;
-    let options = volume::Options {
-        medium,
-        paths: arguments.paths.unwrap_or(paths),
-        folder: arguments.output.clone(),
-    };
+    let options =
+        volume::Options { medium, paths: arguments.paths.unwrap_or(paths), folder: arguments.output.clone() };
     let report = volume::run(&mut studio, head, &base, &stills, &choices, &options, &mut progress);
     progress.end();
     console::notes(&studio.take_notes());
     let report = report?;
-    let page =
-        arguments.output.as_deref().map(|folder| volume::page::write(folder, &report)).transpose()?;
+    let page = arguments.output.as_deref().map(|folder| volume::page::write(folder, &report)).transpose()?;
     if arguments.json {
         return print_json(&Report::Volume(report));
     }
@@ -276,6 +272,11 @@ fn draw_again(path: &Path, folder: &Path) -> Outcome {
         Ok(Report::Chart(report)) => {
             output::folder(folder)?;
             say!("{}", page::write(folder, &report)?.display());
+            Ok(())
+        }
+        Ok(Report::Volume(report)) => {
+            output::folder(folder)?;
+            say!("{}", volume::page::write(folder, &report)?.display());
             Ok(())
         }
         Ok(_) => {

@@ -145,7 +145,15 @@ impl Surroundings for Body {
             _ => What::Blocker,
         };
         let normal = (w * na + u * nb + v * nc).normalize_or(facet);
-        Some(Meet { distance_mm: meeting.distance, place, facet, normal, lifted, what, number: meeting.triangle })
+        Some(Meet {
+            distance_mm: meeting.distance,
+            place,
+            facet,
+            normal,
+            lifted,
+            what,
+            number: meeting.triangle,
+        })
     }
 
     fn is_blocked(&self, origin: Vec3, direction: Vec3, far_mm: f32) -> bool {

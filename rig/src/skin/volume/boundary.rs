@@ -85,7 +85,12 @@ impl Boundary {
 
     /// A direction into which light from `v` goes, with its weight: masking is the only factor left of the chosen
     /// densities. None where the microfacet sends it back through the surface that it came from.
-    pub(super) fn sample(&self, v: Vec3, outward: Vec3, random: &mut SplitMix64) -> Option<(Event, Vec3, f32)> {
+    pub(super) fn sample(
+        &self,
+        v: Vec3,
+        outward: Vec3,
+        random: &mut SplitMix64,
+    ) -> Option<(Event, Vec3, f32)> {
         let outside = v.dot(outward) > 0.0;
         let n = if outside { outward } else { -outward };
         let m = self.visible_microfacet(v, n, random);
@@ -150,7 +155,8 @@ impl Boundary {
         }
         let Some((h, sum)) = self.refracting(l, w, n) else { return 0.0 };
         let (lh, wh) = (l.dot(h), w.dot(h).abs());
-        let through = (1.0 - self.fresnel(lh, true)) * self.distribution(h.dot(n)) * self.masked(cos_l, cos_w);
+        let through =
+            (1.0 - self.fresnel(lh, true)) * self.distribution(h.dot(n)) * self.masked(cos_l, cos_w);
         // The square of the index that light gains inside and loses again on its way to the camera is left out.
         lh * wh / (cos_l * -cos_w) * through / (sum * sum)
     }

@@ -140,7 +140,13 @@ fn statistics(sums: &[[f64; 2]; CHANNELS], n: u64) -> [[f64; CHANNELS]; 2] {
 }
 
 /// Draws the light of lamps in a body.
-pub fn picture(flesh: &Flesh, body: &impl Surroundings, lamps: &[Lamp], view: &View, options: &Options) -> Picture {
+pub fn picture(
+    flesh: &Flesh,
+    body: &impl Surroundings,
+    lamps: &[Lamp],
+    view: &View,
+    options: &Options,
+) -> Picture {
     let walker = Walker { flesh, around: body, lamps, sky: 0.0 };
     let pixel = |i: usize| {
         let mut random = SplitMix64(mixed(options.seed ^ mixed(i as u64 + 1)));

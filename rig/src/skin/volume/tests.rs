@@ -56,12 +56,7 @@ fn body(head: &Head, normals: Normals) -> Body {
 }
 
 fn camera(z: f32, degrees: f32) -> CameraState {
-    CameraState {
-        position: Vec3::Z * z,
-        target: Vec3::ZERO,
-        up: Vec3::Y,
-        fov_y: degrees.to_radians(),
-    }
+    CameraState { position: Vec3::Z * z, target: Vec3::ZERO, up: Vec3::Y, fov_y: degrees.to_radians() }
 }
 
 fn sun(direction: Vec3) -> LightState {
@@ -157,7 +152,10 @@ fn a_ball_that_absorbs_nothing_shows_an_even_sky_less_what_it_reflects() {
     // A few rays pass through such a small ball unscattered; their light does not count.
     let through = 0.02;
     let expected = 1.0 - lost_by_surface;
-    assert!(found < expected + 4.0 * error && found > expected - through - 4.0 * error, "{found} {expected} {error}");
+    assert!(
+        found < expected + 4.0 * error && found > expected - through - 4.0 * error,
+        "{found} {expected} {error}"
+    );
     assert!(lost < 1e-4, "{lost}");
     // Light that meets a second microfacet is lost, more of it where the boundary is rougher.
     let of = |alpha| furnace(&body, &flesh([[2.0, 0.0]; 3], alpha), 6_000).0;
@@ -252,7 +250,10 @@ fn a_wide_ball_is_lit_as_a_plane_is() {
         let variance = flat.iter().map(|p| (f64::from(p[c]) - expected).powi(2)).sum::<f64>() / f64::from(n);
         let spread = error.hypot((variance / f64::from(n)).sqrt());
         // A radius of 30 mean free paths is worth less than one part in a hundred.
-        assert!((light - expected).abs() < 4.0 * spread + 0.01 * expected, "{c}: {light} {expected} +- {spread}");
+        assert!(
+            (light - expected).abs() < 4.0 * spread + 0.01 * expected,
+            "{c}: {light} {expected} +- {spread}"
+        );
         assert!(spread < 0.02 * expected);
     }
     assert!(drawn.lost < 1e-4, "{}", drawn.lost);
@@ -300,12 +301,8 @@ fn noise_falls_as_the_root_of_paths_and_is_what_errors_say() {
     let (few, many) = (drawn(50, 1), drawn(800, 2));
     let ratio = rms(&few.diffuse_error) / rms(&many.diffuse_error);
     assert!((3.2..4.8).contains(&ratio), "{ratio}");
-    let difference: Vec<[f32; 3]> = few
-        .diffuse
-        .iter()
-        .zip(&many.diffuse)
-        .map(|(a, b)| std::array::from_fn(|c| a[c] - b[c]))
-        .collect();
+    let difference: Vec<[f32; 3]> =
+        few.diffuse.iter().zip(&many.diffuse).map(|(a, b)| std::array::from_fn(|c| a[c] - b[c])).collect();
     let expected = rms(&few.diffuse_error).hypot(rms(&many.diffuse_error));
     assert!((0.75..1.3).contains(&(rms(&difference) / expected)), "{} {expected}", rms(&difference));
 }

@@ -184,7 +184,7 @@ pub fn run(
             if let Some(folder) = &folder {
                 let file = file_name(name);
                 let [picture, difference] = [format!("{file}.png"), format!("{file}-difference.png")];
-                let light: Vec<[f32; 3]> = light.iter().map(|p| p.map_or([0.0; 3], |p| p)).collect();
+                let light: Vec<[f32; 3]> = light.iter().map(|p| p.unwrap_or_default()).collect();
                 output::save_picture(&folder.join(&picture), &shown.light(&light))?;
                 output::save_picture(&folder.join(&difference), &shown.difference(&light, &truth))?;
                 point.picture = relative(&picture);

@@ -69,8 +69,9 @@ fn short(v: f64) -> String {
 
 /// One line for each still and method, and one for `all` stills.
 fn csv(report: &VolumeReport) -> String {
-    let mut out =
-        String::from("choice,still,relative_rmse,relative_rmse_with_noise,bias_lit,bias_terminator,bias_thin,bias_shadow\n");
+    let mut out = String::from(
+        "choice,still,relative_rmse,relative_rmse_with_noise,bias_lit,bias_terminator,bias_thin,bias_shadow\n",
+    );
     for choice in &report.choices {
         for (point, still) in choice.points.iter().zip(&report.stills) {
             let [error, noisy] = [point.relative_rmse, point.relative_rmse_with_noise].map(short);

@@ -91,7 +91,8 @@ impl MediumName {
     /// As [`MediumName::media`].
     pub fn settings(self, base: &Settings) -> Outcome<Settings> {
         let name = format!("{}-monte-carlo", self.name());
-        let profile = ProfileModel::MonteCarlo.profile(&name, &self.media()?, None, PHOTONS).map_err(Failure::input)?;
+        let profile =
+            ProfileModel::MonteCarlo.profile(&name, &self.media()?, None, PHOTONS).map_err(Failure::input)?;
         let mut settings = base.clone();
         let quality = &mut settings.quality;
         quality.profile = DiffusionProfile::from(profile);
