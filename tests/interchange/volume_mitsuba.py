@@ -35,7 +35,7 @@ def drawn(scene, black, samples, seed):
     scale = float(extinction.max())
     loaded = mitsuba.load_dict({
         "type": "scene",
-        "integrator": {"type": "volpath", "max_depth": -1, "rr_depth": 64},
+        "integrator": {"type": "volpathmis", "max_depth": -1, "rr_depth": 64},
         "sensor": {
             "type": "perspective",
             "fov": camera["fovYDegrees"],
