@@ -34,6 +34,7 @@ pub mod head;
 pub mod hemoglobin;
 pub mod json;
 pub mod landmarks;
+pub mod level;
 pub mod life;
 pub mod lights;
 pub mod limits;

@@ -1,5 +1,7 @@
 //! A head of a scene with its buffers of the frame, as passes receive it.
 
+use std::sync::Arc;
+
 use glam::Mat4;
 use rubor_rig::face_state::FaceState;
 
@@ -46,6 +48,9 @@ pub(crate) struct Instance {
     blood: Image,
     wrinkle_weights: Image,
     hairs: wgpu::Buffer,
+    family: Arc<()>,
+    /// Whether no frame has used it yet, so that it has no previous positions.
+    pub(crate) is_new: bool,
 }
 
 /// Four wrinkle maps have their weights in one layer.
@@ -66,6 +71,8 @@ impl Instance {
             blood: Image::new(gpu, "blood", ImageSpec::light(side)),
             wrinkle_weights,
             hairs: gpu.storage_zeroed("hairs", hair_bytes(head)),
+            family: head.family.clone(),
+            is_new: true,
         }
     }
 
@@ -75,6 +82,11 @@ impl Instance {
             && self.tangent_frames.size() == (u64::from(head.vertex_count) * FRAME_BYTES).max(16)
             && self.wrinkle_weights.texture().depth_or_array_layers() == layers(head)
             && self.hairs.size() == hair_bytes(head).max(16)
+    }
+
+    /// Whether it is that of a level of the same head.
+    pub(crate) fn is_of(&self, head: &HeadOnGpu) -> bool {
+        Arc::ptr_eq(&self.family, &head.family)
     }
 
     /// Bytes on the device.
@@ -104,7 +116,11 @@ pub(crate) fn posed<'a>(
         state: placed.state,
         world_from_head: world_from_head(placed),
         positions: &buffers.positions,
-        previous_positions: if has_past { &buffers.previous_positions } else { &buffers.positions },
+        previous_positions: if has_past && !buffers.is_new {
+            &buffers.previous_positions
+        } else {
+            &buffers.positions
+        },
         kept_positions: &buffers.previous_positions,
         tangent_frames: &buffers.tangent_frames,
         blood: &buffers.blood,
