@@ -280,6 +280,9 @@ pub struct ChartError {
     /// Its 99th percentile.
     #[serde(rename = "flip99")]
     pub flip_99: f64,
+    /// Relative RMSE of the displayed picture in linear light, over the same pixels.
+    #[serde(default)]
+    pub relative_rmse: f64,
     /// Relative RMSE of diffuse radiance before albedo, on skin, to `reference-surface`; only where the measure is light.
     pub relative_rmse_to_surface: Option<f64>,
     /// The same to `reference-screen`.

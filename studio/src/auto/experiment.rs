@@ -144,7 +144,7 @@ fn measure(
 ) -> Outcome<Measured> {
     let combinations = combinations(auto);
     let settings = |c: &Vec<Option<usize>>| {
-        let chosen = Chosen { choices: c.clone(), flip: 0.0, milliseconds: 0.0, is_kept: true };
+        let chosen = Chosen { choices: c.clone(), ..Chosen::default() };
         auto.settings(base, &chosen)
     };
     let all: Vec<Settings> = combinations.iter().map(settings).collect::<Outcome<_>>()?;
@@ -215,8 +215,7 @@ mod tests {
             errors: vec![vec![0.5, 0.5], vec![0.01, 0.1], vec![0.0, 0.0]],
             ms: vec![vec![1.0, 1.0], vec![2.0, 2.0], vec![4.0, 4.0]],
         };
-        let chosen =
-            |c: usize| Chosen { choices: vec![Some(c)], flip: 0.0, milliseconds: 0.0, is_kept: true };
+        let chosen = |c: usize| Chosen { choices: vec![Some(c)], ..Chosen::default() };
         let found = row(0.02, &measured, &[chosen(1), chosen(2)]);
         assert_eq!((found.possible, found.kept), (2, 2));
         assert_eq!((found.over_cheapest, found.over_fixed), (1.0, Some(6.0 / 8.0)));

@@ -240,6 +240,7 @@ pub fn times(
     let error = ChartError {
         flip_mean: 0.0,
         flip_99: 0.0,
+        relative_rmse: 0.0,
         relative_rmse_to_surface: None,
         relative_rmse_to_screen: None,
     };

@@ -115,7 +115,11 @@ impl Truth {
 
     /// How far a choice is from it, and its map of visible differences.
     pub(crate) fn error(&self, test: &Drawn) -> (ChartError, Vec<f32>) {
-        let map = flip::ldr(&pixels(&test.frame.image), &self.pixels, flip::PIXELS_PER_DEGREE);
+        let shown = pixels(&test.frame.image);
+        let map = flip::ldr(&shown, &self.pixels, flip::PIXELS_PER_DEGREE);
+        let counted_of = |p: &Pixels| -> Vec<[f32; 3]> {
+            p.linear.iter().zip(&self.counts).filter(|(_, counts)| **counts).map(|(v, _)| *v).collect()
+        };
         let counted: Vec<f32> =
             map.iter().zip(&self.counts).filter(|(_, counts)| **counts).map(|(v, _)| *v).collect();
         let (flip_mean, flip_99) = mean_and_percentile(&counted);
@@ -126,6 +130,7 @@ impl Truth {
         let error = ChartError {
             flip_mean,
             flip_99,
+            relative_rmse: relative_rmse(&counted_of(&shown), &counted_of(&self.pixels)),
             relative_rmse_to_surface: light.map(|l| l[0]),
             relative_rmse_to_screen: light.map(|l| l[1]),
         };
