@@ -128,6 +128,16 @@ impl Studio {
         self.renderer.gpu().has_timestamps
     }
 
+    /// Bytes of the heads on the device, with what frames write of them.
+    pub fn head_bytes(&self) -> u64 {
+        self.heads.iter().map(|head| head.bytes_in_scene()).sum()
+    }
+
+    /// Single hairs of the scalps of all heads: those on the device.
+    pub fn hairs(&self) -> u32 {
+        self.heads.iter().map(|head| head.hair_counts()[0]).sum()
+    }
+
     /// Replaces the heads; a frame takes one shot per head, in this order. One that is there several times is kept once.
     ///
     /// # Errors

@@ -15,6 +15,7 @@ use super::authored::AuthoredOnGpu;
 use super::clusters::{Cluster, clusters};
 use super::footprint::{APPEARANCE_SIZE, largest_of, mask_size, slope_size};
 use super::hair_roots::roots;
+use super::posed_head::instance_bytes;
 use crate::device::kernel::Resource;
 use crate::device::texture::{self, Texel};
 use crate::device::{Bind, Gpu};
@@ -77,7 +78,10 @@ pub struct HeadOnGpu {
     pub(crate) ring_starts: wgpu::Buffer,
     pub(crate) ring: wgpu::Buffer,
     pub(crate) hair_roots: wgpu::Buffer,
+    /// Hairs of the scalp on the device: the first of those that grow, in random order.
     pub(crate) hair_root_count: u32,
+    /// Hairs that grow, for which these stand.
+    pub(crate) grown_hairs: u32,
     pub(crate) maps: Option<MapsOnGpu>,
     pub(crate) authored: Option<AuthoredOnGpu>,
     pub(crate) skin_color: wgpu::TextureView,
@@ -167,7 +171,9 @@ impl HeadOnGpu {
         let opaque_points: Vec<u32> = corners.map(|v| mesh.vertices[*v as usize].point).collect();
         let (ring_starts, ring) = rings(head, &triangles);
         let maps = upload_maps(gpu, head);
-        let hair_roots = roots(head, &triangles);
+        let mut hair_roots = roots(head, &triangles);
+        let grown_hairs = hair_roots.len() as u32;
+        hair_roots.truncate(head.maps.hair_count.map_or(usize::MAX, |most| most as usize));
         let texels = color.texels.iter().map(|c| [c[0], c[1], c[2], 1.0]).collect();
         let skin_color =
             texture::upload_half(gpu, "skin colour", [color.width, color.height], &[vec![texels]]);
@@ -190,6 +196,7 @@ impl HeadOnGpu {
             ring: gpu.storage("rings", &ring),
             hair_roots: gpu.storage("hair roots", &hair_roots),
             hair_root_count: hair_roots.len() as u32,
+            grown_hairs,
             maps,
             authored: AuthoredOnGpu::new(gpu, head)?,
             skin_color,
@@ -210,6 +217,16 @@ impl HeadOnGpu {
     /// Triangles that go through the visibility buffer, and those that are blended over the picture.
     pub fn triangle_counts(&self) -> (u32, u32) {
         (self.opaque_triangles, self.overlay_triangles)
+    }
+
+    /// Bytes on the device for this head in a scene: [`HeadOnGpu::memory_bytes`] and what frames write of it.
+    pub fn bytes_in_scene(&self) -> u64 {
+        self.memory_bytes + instance_bytes(self)
+    }
+
+    /// Single hairs of the scalp: those on the device, and those that grow.
+    pub fn hair_counts(&self) -> [u32; 2] {
+        [self.hair_root_count, self.grown_hairs]
     }
 
     /// The undeformed points: a buffer of this head alone.
