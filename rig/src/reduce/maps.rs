@@ -108,8 +108,7 @@ impl Reduction {
             })
             .collect();
         let has_lost_all = distributions.is_empty() && !maps.distributions.is_empty();
-        let zones: Vec<&WrinkleZone> =
-            kept(maps.zones.len(), &self.zones).map(|i| &maps.zones[i]).collect();
+        let zones: Vec<&WrinkleZone> = kept(maps.zones.len(), &self.zones).map(|i| &maps.zones[i]).collect();
         // Numbers of the wrinkle maps that stay.
         let of_zones: BTreeSet<u32> = zones.iter().map(|z| z.wrinkle_map).collect();
         let stays = |i: usize| self.zones.is_empty() || of_zones.contains(&(i as u32));

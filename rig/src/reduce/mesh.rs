@@ -54,7 +54,8 @@ impl Reduction {
 
 /// The mesh without parts, and new numbers of vertices and points. What no part ever used stays.
 fn without_parts(mesh: &Mesh, gone: &BTreeSet<usize>) -> (Mesh, Numbers, Numbers) {
-    let triangles_of = |part: &Part| &mesh.triangles[part.triangles.start as usize..part.triangles.end as usize];
+    let triangles_of =
+        |part: &Part| &mesh.triangles[part.triangles.start as usize..part.triangles.end as usize];
     // Whether what stays and what goes use a vertex or a point.
     let mut vertices = vec![[false; 2]; mesh.vertices.len()];
     let mut points = vec![[false; 2]; mesh.points.len()];

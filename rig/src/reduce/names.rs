@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Reduction, kept};
 use crate::evaluate::LIVING_SHAPES;
-use crate::expression::{Combination, Expression, Inbetween, Rig, State};
+use crate::expression::{Combination, Expression, Fallback, Inbetween, Rig, State};
 use crate::head::{BlendShape, Distribution, Head, SkinMaps, WrinkleZone};
 use crate::json::Source;
 use crate::map::Map;
@@ -53,7 +53,12 @@ impl Names {
             numbers[old] = Some(new as u32);
         }
         let left = names.enumerate().filter(|(i, _)| !gone.contains(i)).map(|(_, name)| name);
-        Self { left: Resolver::new(left), whole: Resolver::new(all.iter().map(String::as_str)), numbers, names: all }
+        Self {
+            left: Resolver::new(left),
+            whole: Resolver::new(all.iter().map(String::as_str)),
+            numbers,
+            names: all,
+        }
     }
 
     /// What the name meant on the whole head, and what is left of that by new numbers.
@@ -159,8 +164,7 @@ impl Reduction {
     pub fn rig(&self, head: &Head, rig: &Rig, needed: &BTreeSet<String>) -> (Rig, RigLoss) {
         let shapes = self.shape_names(head);
         let zones = Names::of(head.maps.zones.iter().map(|z| z.name.as_str()), &self.zones);
-        let blood =
-            Names::of(head.maps.distributions.iter().map(|d| d.name.as_str()), &self.distributions);
+        let blood = Names::of(head.maps.distributions.iter().map(|d| d.name.as_str()), &self.distributions);
         let mut loss = RigLoss::default();
         let mut reduced = Rig {
             expressions: BTreeMap::new(),
@@ -188,8 +192,7 @@ impl Reduction {
             }
         }
         for (name, state) in &rig.states {
-            let (left, is_less) = of_state(state, &blood);
-            let is_empty = left.hemoglobin.is_empty() && left.hemoglobin_scale == 1.0 && left.fallback.is_none();
+            let (left, is_less, is_empty) = of_state(state, &blood);
             if loss.note(name, is_less, is_empty, needed) {
                 reduced.states.insert(name.clone(), left);
             }
@@ -226,24 +229,23 @@ impl RigLoss {
     }
 }
 
-fn of_state(state: &State, blood: &Names) -> (State, bool) {
+/// What is left of a state, whether that is less, and whether it is nothing.
+fn of_state(state: &State, blood: &Names) -> (State, bool, bool) {
     // A head that lacks a distribution shows the fallback; so it has to, whatever goes.
-    let shows_fallback = state.fallback.is_some() && !blood.has_all(&state.hemoglobin);
-    let mut left = state.clone();
-    let mut is_less = false;
-    if !shows_fallback {
-        (left.hemoglobin, is_less) = blood.weights(&state.hemoglobin);
+    match &state.fallback {
+        Some(fallback) if !blood.has_all(&state.hemoglobin) => {
+            let (hemoglobin, is_less) = blood.weights(&fallback.hemoglobin);
+            let is_empty = hemoglobin.is_empty() && fallback.hemoglobin_scale == 1.0;
+            let fallback = Some(Fallback { hemoglobin, ..fallback.clone() });
+            (State { fallback, ..state.clone() }, is_less, is_empty)
+        }
+        fallback => {
+            let (hemoglobin, is_less) = blood.weights(&state.hemoglobin);
+            let is_empty = hemoglobin.is_empty() && state.hemoglobin_scale == 1.0;
+            let left = |f: &Fallback| Fallback { hemoglobin: blood.weights(&f.hemoglobin).0, ..f.clone() };
+            (State { hemoglobin, fallback: fallback.as_ref().map(left), ..state.clone() }, is_less, is_empty)
+        }
     }
-    if let (Some(left), Some(fallback)) = (&mut left.fallback, &state.fallback) {
-        let (weights, less) = blood.weights(&fallback.hemoglobin);
-        left.hemoglobin = weights;
-        is_less |= less && shows_fallback;
-    }
-    if !shows_fallback && left.hemoglobin.is_empty() && is_less {
-        // Nothing is left to fall back from.
-        left.fallback = None;
-    }
-    (left, is_less)
 }
 
 /// What is left of a combination: without one of its drivers it never acts.
@@ -266,9 +268,11 @@ fn of_combination(combination: &Combination, shapes: &Names) -> Vec<Combination>
         Becomes::Same => vec![Combination { drivers, ..combination.clone() }],
         Becomes::Gone => Vec::new(),
         // A combination gives its shape all of its weight.
-        Becomes::Others(others) => (others.into_iter().filter(|(name, factor)| *factor == 1.0 && !seen.contains(name)))
-            .map(|(shape, _)| Combination { shape, drivers: drivers.clone(), mode: combination.mode })
-            .collect(),
+        Becomes::Others(others) => {
+            (others.into_iter().filter(|(name, factor)| *factor == 1.0 && !seen.contains(name)))
+                .map(|(shape, _)| Combination { shape, drivers: drivers.clone(), mode: combination.mode })
+                .collect()
+        }
     }
 }
 

@@ -152,7 +152,8 @@ impl Contents {
     }
 }
 
-fn parse_error(text: &str) -> Result<Bound, String> {
+/// A bound of an error.
+pub(super) fn parse_error(text: &str) -> Result<Bound, String> {
     match text.parse() {
         Ok(bound @ Bound::Flip(_)) => Ok(bound),
         _ => Err(format!("found {text:?}, expected flip=X with X above 0, such as flip=0.02")),
