@@ -221,7 +221,7 @@ fn totals(report: &BudgetReport) -> Outcome {
     say!("| | whole | reduced | |");
     say!("| --- | --- | --- | --- |");
     let share = |a: f64, b: f64| if a > 0.0 { format!("{:.0} %", 100.0 * b / a) } else { "-".to_owned() };
-    let bytes = |name: &str, a: u64, b: u64| {
+    let bytes = |name: &str, a: u64, b: u64| -> Outcome {
         say!("| {name} | {} | {} | {} |", megabytes(a), megabytes(b), share(a as f64, b as f64));
         Ok(())
     };

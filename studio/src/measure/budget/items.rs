@@ -55,11 +55,21 @@ impl Subject {
     /// last level none.
     pub(super) fn leave_out(self, level: u32, hairs: u32, less: &mut Reduction) {
         match self {
-            Self::Shape(i) => drop(less.shapes.insert(i)),
-            Self::Distribution(i) => drop(less.distributions.insert(i)),
-            Self::Zone(i) => drop(less.zones.insert(i)),
-            Self::Part(i) => drop(less.parts.insert(i)),
-            Self::Map(kind) => drop(less.halvings.insert(kind, level)),
+            Self::Shape(i) => {
+                less.shapes.insert(i);
+            }
+            Self::Distribution(i) => {
+                less.distributions.insert(i);
+            }
+            Self::Zone(i) => {
+                less.zones.insert(i);
+            }
+            Self::Part(i) => {
+                less.parts.insert(i);
+            }
+            Self::Map(kind) => {
+                less.halvings.insert(kind, level);
+            }
             Self::Hairs => less.hairs = Some(hairs_at(level, hairs)),
         }
     }
@@ -123,7 +133,9 @@ impl Use {
         for inbetween in &rig.inbetweens {
             let acts = names.resolve(&inbetween.target).iter().any(|t| !shapes.contains(&(t.index as usize)));
             if acts {
-                names.resolve(&inbetween.shape).iter().for_each(|t| drop(shapes.remove(&(t.index as usize))));
+                for driven in names.resolve(&inbetween.shape) {
+                    shapes.remove(&(driven.index as usize));
+                }
             }
         }
         let hidden = head.mesh.parts.iter().enumerate().filter(|(_, p)| p.material == Material::Hidden);
