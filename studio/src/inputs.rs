@@ -54,6 +54,17 @@ pub fn head_of_bytes(bytes: &[u8], name: &Path) -> Outcome<LoadedHead> {
     finished(plain_head_of_bytes(bytes, name)?, name)
 }
 
+/// Bytes of the file of a head, or of the built-in one.
+///
+/// # Errors
+/// The file is not there.
+pub fn head_file_bytes(path: Option<&Path>) -> Outcome<u64> {
+    match path {
+        None => Ok(DEFAULT_HEAD.len() as u64),
+        Some(path) => Ok(std::fs::metadata(path).map_err(|e| Failure::read(path, e))?.len()),
+    }
+}
+
 /// Name of the built-in head in messages.
 const BUILT_IN: &str = "built-in head";
 

@@ -250,6 +250,8 @@ fn a_smile_needs_no_frown_and_the_stated_error_is_that_of_the_file() {
     }
     let bytes = std::fs::metadata(&reduced).expect("a file").len() as f64;
     assert_eq!(number(&report, "/reduced/fileBytes"), bytes);
+    let came = std::fs::metadata(folder.path("head.glb")).expect("a file").len() as f64;
+    assert_eq!(number(&report, "/inputBytes"), came);
 }
 
 /// Mean FLIP over the first head and the pixels around it, for each frame: written apart from the library's.
@@ -303,6 +305,7 @@ fn report(studio: &mut Studio, sequences: &[&str], most: f64) -> Value {
     };
     let scene = Scene {
         head: head(),
+        input_bytes: 0,
         rig: Rig::from_json("rig.json", RIG).expect("a rig"),
         sequences: sequences.iter().map(sequence).collect(),
     };

@@ -19,6 +19,8 @@ pub struct BudgetReport {
     pub settings: Settings,
     /// Name of the head.
     pub head: String,
+    /// Bytes of the file that it came from, in the coding of that file.
+    pub input_bytes: u64,
     /// The sequences, and which of their frames were looked at.
     pub sequences: Vec<BudgetSequence>,
     /// What the error of each of these frames may be.

@@ -57,6 +57,8 @@ const PNG_SHARE: f64 = 0.5;
 pub struct Scene {
     /// The whole head.
     pub head: Head,
+    /// Bytes of the file that it came from, for the report.
+    pub input_bytes: u64,
     /// Its rig.
     pub rig: Rig,
     /// Sequences with their files, at least one.

@@ -59,6 +59,7 @@ impl Found<'_> {
             adapter: trials.studio.adapter(),
             settings: self.options.settings.first().cloned().unwrap_or_default(),
             head: scene.head.name.clone(),
+            input_bytes: scene.input_bytes,
             sequences: scene.sequences.iter().enumerate().map(of_sequence).collect(),
             bound: self.options.bound,
             whole,
