@@ -42,6 +42,7 @@ pub mod map;
 pub mod mask;
 pub mod names;
 pub mod random;
+pub mod reduce;
 pub mod skin;
 pub mod strain;
 pub mod timeline;

@@ -1,4 +1,6 @@
-//! Reports: the measurements of a job (`stats.json`), a benchmark, a chart, a gallery.
+//! Reports: the measurements of a job (`stats.json`), a benchmark, a chart, a budget, a gallery.
+
+mod budget;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -9,6 +11,11 @@ use rubor_renderer::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+
+pub use budget::{
+    BudgetCoding, BudgetError, BudgetFate, BudgetFrame, BudgetItem, BudgetKind, BudgetReport, BudgetSequence,
+    BudgetTotals,
+};
 
 use crate::measure::chart::Measure;
 
@@ -27,6 +34,8 @@ pub enum Report {
     Stability(StabilityReport),
     /// Choices of `auto` beside every fixed setting.
     Auto(AutoReport),
+    /// What sequences need of a head.
+    Budget(BudgetReport),
     /// A page of pictures.
     Gallery(GalleryReport),
 }

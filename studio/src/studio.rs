@@ -131,6 +131,16 @@ impl Studio {
         self.renderer.gpu().has_timestamps
     }
 
+    /// Bytes of the heads on the device, with what frames write of them.
+    pub fn head_bytes(&self) -> u64 {
+        self.heads.iter().map(|head| head.bytes_in_scene()).sum()
+    }
+
+    /// Single hairs of the scalps of all heads: those on the device.
+    pub fn hairs(&self) -> u32 {
+        self.heads.iter().map(|head| head.hair_counts()[0]).sum()
+    }
+
     /// Replaces the heads; a frame takes one shot per head, in this order. One that is there several times is kept once.
     ///
     /// # Errors
@@ -298,7 +308,11 @@ impl Studio {
 
 /// Coarser levels of a head, made when they are needed.
 fn ladder(head: &Head) -> Ladder {
-    let hair = SkinMaps { hair: head.maps.hair.clone(), ..SkinMaps::default() };
+    let hair = SkinMaps {
+        hair: head.maps.hair.clone(),
+        hair_count: head.maps.hair_count,
+        ..SkinMaps::default()
+    };
     let geometry = Head {
         name: head.name.clone(),
         mesh: head.mesh.clone(),

@@ -17,6 +17,7 @@ use super::clusters::{Cluster, clusters};
 use super::footprint::{APPEARANCE_SIZE, largest_of, mask_size, slope_size};
 use super::hair_roots::{Root, drawn_hairs, moved_roots, roots};
 use super::level::ERROR_PIXELS;
+use super::posed_head::instance_bytes;
 use crate::device::kernel::Resource;
 use crate::device::texture::{self, Texel};
 use crate::device::{Bind, Gpu};
@@ -79,9 +80,10 @@ pub struct HeadOnGpu {
     pub(crate) ring_starts: wgpu::Buffer,
     pub(crate) ring: wgpu::Buffer,
     pub(crate) hair_roots: wgpu::Buffer,
+    /// Hairs of the scalp on the device: the first of those that grow, in random order.
     pub(crate) hair_root_count: u32,
-    /// Hairs of the whole head: a level has the first ones of them.
-    pub(crate) all_hairs: u32,
+    /// Hairs that grow, for which these stand.
+    pub(crate) grown_hairs: u32,
     pub(crate) maps: Option<MapsOnGpu>,
     pub(crate) authored: Option<AuthoredOnGpu>,
     pub(crate) skin_color: wgpu::TextureView,
@@ -125,12 +127,18 @@ impl Ladder {
     }
 }
 
+/// Hairs of the scalp that a head has at most.
+fn most_hairs(head: &Head) -> usize {
+    head.maps.hair_count.map_or(usize::MAX, |most| most as usize)
+}
+
 /// What the levels of a head share.
 struct Looks {
     maps: Option<MapsOnGpu>,
     authored: Option<AuthoredOnGpu>,
     skin_color: wgpu::TextureView,
     mm_per_texture: f32,
+    grown_hairs: u32,
 }
 
 #[derive(Clone)]
@@ -181,7 +189,9 @@ impl HeadOnGpu {
         limit("number of wrinkle zones", head.maps.zones.len(), MAX_ZONES)?;
 
         let (triangles, _) = ordered_triangles(head);
-        let hair_roots = roots(head, &triangles);
+        let mut hair_roots = roots(head, &triangles);
+        let grown_hairs = hair_roots.len() as u32;
+        hair_roots.truncate(most_hairs(head));
         let texels = color.texels.iter().map(|c| [c[0], c[1], c[2], 1.0]).collect();
         let skin_color =
             texture::upload_half(gpu, "skin colour", [color.width, color.height], &[vec![texels]]);
@@ -190,6 +200,7 @@ impl HeadOnGpu {
             authored: AuthoredOnGpu::new(gpu, head)?,
             skin_color,
             mm_per_texture: mm_per_texture(head),
+            grown_hairs,
         };
         let mut result = Self::of(gpu, head, bounds, looks, &hair_roots);
         result.memory_bytes = result.count_bytes();
@@ -215,22 +226,23 @@ impl HeadOnGpu {
     fn levels(&self, gpu: &Gpu, head: &Head, levels: &[Level]) -> Vec<(f32, Self)> {
         let order = triangle_order(head).0;
         let (triangles, _) = ordered_triangles(head);
-        let all = roots(head, &triangles);
+        let mut all = roots(head, &triangles);
+        all.truncate(most_hairs(head));
         let of = |level: &Level| {
             let reduced = head.at_level(level);
             let level_order = triangle_order(&reduced).0;
             let host = |triangle: u32| level.hosts[order[triangle as usize] as usize];
             // Frames draw no more than these.
-            let count = drawn_hairs(all.len() as u32, level.error_metres / ERROR_PIXELS);
-            let roots = moved_roots(&all[..count as usize], (head, &order), (&reduced, &level_order), host);
+            let drawn = drawn_hairs(self.grown_hairs, level.error_metres / ERROR_PIXELS) as usize;
+            let roots = moved_roots(&all[..drawn.min(all.len())], (head, &order), (&reduced, &level_order), host);
             let looks = Looks {
                 maps: self.maps.clone(),
                 authored: self.authored.as_ref().map(|a| a.of_level(gpu, &reduced)),
                 skin_color: self.skin_color.clone(),
                 mm_per_texture: self.mm_per_texture,
+                grown_hairs: self.grown_hairs,
             };
             let mut geometry = Self::of(gpu, &reduced, self.bounds, looks, &roots);
-            geometry.all_hairs = all.len() as u32;
             geometry.family = self.family.clone();
             geometry.memory_bytes = geometry.count_bytes() - geometry.map_bytes();
             (level.error_metres, geometry)
@@ -286,7 +298,7 @@ impl HeadOnGpu {
             ring: gpu.storage("rings", &ring),
             hair_roots: gpu.storage("hair roots", hair_roots),
             hair_root_count: hair_roots.len() as u32,
-            all_hairs: hair_roots.len() as u32,
+            grown_hairs: looks.grown_hairs,
             maps: looks.maps,
             authored: looks.authored,
             skin_color: looks.skin_color,
@@ -307,6 +319,16 @@ impl HeadOnGpu {
     /// Triangles that go through the visibility buffer, and those that are blended over the picture.
     pub fn triangle_counts(&self) -> (u32, u32) {
         (self.opaque_triangles, self.overlay_triangles)
+    }
+
+    /// Bytes on the device for this head in a scene: [`HeadOnGpu::memory_bytes`] and what frames write of it.
+    pub fn bytes_in_scene(&self) -> u64 {
+        self.memory_bytes + instance_bytes(self)
+    }
+
+    /// Single hairs of the scalp: those on the device, and those that grow.
+    pub fn hair_counts(&self) -> [u32; 2] {
+        [self.hair_root_count, self.grown_hairs]
     }
 
     /// The undeformed points: a buffer of this head alone.

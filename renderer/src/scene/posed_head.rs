@@ -96,6 +96,16 @@ impl Instance {
     }
 }
 
+/// Bytes that [`Instance::new`] takes for a head.
+pub(crate) fn instance_bytes(head: &HeadOnGpu) -> u64 {
+    let blood = ImageSpec::light([APPEARANCE_SIZE; 2]);
+    let weights =
+        ImageSpec::storage([APPEARANCE_SIZE; 2], wgpu::TextureFormat::Rgba8Unorm).layers(layers(head));
+    let points = (u64::from(head.point_count) * 16).max(16);
+    let frames = (u64::from(head.vertex_count) * FRAME_BYTES).max(16);
+    2 * points + frames + hair_bytes(head).max(16) + blood.bytes() + weights.bytes()
+}
+
 fn hair_bytes(head: &HeadOnGpu) -> u64 {
     u64::from(head.hair_root_count) * HAIR_BYTES
 }

@@ -157,7 +157,8 @@ impl Contents {
 /// Error of what is left out without being asked: a quarter of what `smaa-1x` has to 64 samples of a pixel (docs/speed.md).
 const UNSEEN: Bound = Bound::Flip(0.01);
 
-fn parse_error(text: &str) -> Result<Bound, String> {
+/// A bound of an error.
+pub(super) fn parse_error(text: &str) -> Result<Bound, String> {
     match text.parse() {
         Ok(bound @ (Bound::Flip(_) | Bound::RelativeRmse(_))) => Ok(bound),
         _ => Err(format!("found {text:?}, expected flip=X or rel-rmse=X with X above 0, such as flip=0.02")),

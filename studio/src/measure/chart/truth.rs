@@ -30,14 +30,7 @@ pub(crate) struct Drawn {
 pub(crate) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light: bool) -> Outcome<Drawn> {
     let mut settings = settings.clone();
     settings.output.channels = if light { vec![Channel::Diffuse, Channel::Albedo] } else { Vec::new() };
-    let shots = std::slice::from_ref(shot);
-    studio.cut(0);
-    if settings.quality.antialias.is_temporal() {
-        for _ in 1..SETTLED_FRAMES {
-            studio.draw(shots, 0.0, &settings)?;
-        }
-    }
-    let frame = studio.render(shots, 0.0, &settings)?;
+    let frame = settled(studio, shot, &settings)?;
     // The fourth component of the diffuse light is for the methods on the screen.
     let diffuse = match frame.channels.as_slice() {
         [diffuse, albedo] => (diffuse.texels::<4>().zip(albedo.texels::<4>()))
@@ -46,6 +39,18 @@ pub(crate) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light:
         _ => Vec::new(),
     };
     Ok(Drawn { frame, diffuse })
+}
+
+/// The frame of a still scene after which antialiasing over time changes no more.
+fn settled(studio: &mut Studio, shot: &Shot, settings: &Settings) -> Outcome<Frame> {
+    let shots = std::slice::from_ref(shot);
+    studio.cut(0);
+    if settings.quality.antialias.is_temporal() {
+        for _ in 1..SETTLED_FRAMES {
+            studio.draw(shots, 0.0, settings)?;
+        }
+    }
+    studio.render(shots, 0.0, settings)
 }
 
 /// A scene as it should be.
@@ -95,9 +100,7 @@ impl Truth {
             Measure::Picture => {
                 let mut covered = settings.clone();
                 covered.output.channels = vec![Channel::Radiance];
-                let shots = std::slice::from_ref(shot);
-                studio.cut(0);
-                let mut frame = studio.render(shots, 0.0, &covered)?;
+                let mut frame = settled(studio, shot, &covered)?;
                 let Some(radiance) = frame.channels.pop() else {
                     return Err(Failure::job("the frame has no radiance"));
                 };

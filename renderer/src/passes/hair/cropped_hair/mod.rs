@@ -15,6 +15,9 @@
 //! stand for all ([`DetailMethod::Auto`]; Cook et al. 2007): each covers what its share of hairs would let through,
 //! so the number goes up by one hair at a time in a zoom.
 //!
+//! A head may keep fewer hairs than grow ([`SkinMaps::hair_count`](rubor_rig::head::SkinMaps::hair_count)): the first ones, which then stand
+//! for all in the same way.
+//!
 //! Does not: sort (hairs of one colour), cast shadows.
 
 #[cfg(test)]
@@ -83,12 +86,11 @@ impl CroppedHair {
         let hair_light = fibre.params(r, light);
         let numbers = |h: &&PosedHead<'_>| {
             let color = h.head.maps.as_ref().map_or([0.0; 3], |m| m.hair_color_linear);
-            let all = h.head.all_hairs;
+            let [most, all] = h.head.hair_counts();
             let count = match detail {
-                DetailMethod::Full => all,
-                DetailMethod::Auto => drawn_hairs(all, seen.pixel_metres(h.index)),
+                DetailMethod::Full => most,
+                DetailMethod::Auto => drawn_hairs(all, seen.pixel_metres(h.index)).min(most),
             };
-            let count = count.min(h.head.hair_root_count);
             Params {
                 color: Vec3::from(color).extend(1.0).to_array(),
                 count,
