@@ -12,9 +12,6 @@ use bvh::ray::Ray;
 use glam::Vec3;
 use nalgebra::{Point3, Vector3};
 
-#[path = "../src/convert/bvh.rs"]
-mod ours;
-
 struct Triangle {
     corners: [Point3<f32>; 3],
     node: usize,
@@ -70,7 +67,7 @@ fn main() {
     println!("{} triangles, {count} rays", triangles.len());
 
     let start = Instant::now();
-    let own = ours::Bvh::new(triangles.clone());
+    let own = rubor_rig::bvh::Bvh::new(triangles.clone());
     let built = start.elapsed();
     let start = Instant::now();
     let hits = rays.iter().filter(|(o, d)| own.hit(*o, *d, near, far)).count();

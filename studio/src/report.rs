@@ -18,6 +18,7 @@ pub use budget::{
 };
 
 use crate::measure::chart::Measure;
+use crate::measure::volume::MediumName;
 
 /// A report. In JSON, `of` names the kind of work.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -36,6 +37,8 @@ pub enum Report {
     Auto(AutoReport),
     /// What sequences need of a head.
     Budget(BudgetReport),
+    /// Light of methods beside that of the volume.
+    Volume(VolumeReport),
     /// A page of pictures.
     Gallery(GalleryReport),
 }
@@ -399,6 +402,96 @@ pub struct StabilityRow {
     pub residuals: Vec<f64>,
     /// Diffuse light of each step over that of `reference-screen`.
     pub energies: Vec<f64>,
+}
+
+/// Light of methods beside that of paths through the volume of the head.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct VolumeReport {
+    /// Device.
+    pub adapter: Adapter,
+    /// The base: each choice changes one setting of it, or a few.
+    pub settings: Settings,
+    /// The skin.
+    pub medium: MediumName,
+    /// Its index of refraction.
+    pub eta: f64,
+    /// Roughness of its boundary, alpha of GGX.
+    pub alpha: f64,
+    /// Share of an even sky that a flat piece of it returns towards the normal, R, G, B; light is over that.
+    pub flat: [f64; 3],
+    /// Paths of a pixel.
+    pub paths: u32,
+    /// Stills.
+    pub stills: Vec<VolumeStill>,
+    /// Methods.
+    pub choices: Vec<VolumeChoice>,
+}
+
+/// A still.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct VolumeStill {
+    /// Name, also of its folder.
+    pub name: String,
+    /// The failure that it provokes; empty for a scene of the user.
+    pub provokes: String,
+    /// Standard error of the right light over that light: roots of the mean squares over skin.
+    pub noise: f64,
+    /// Share of paths that left a closed surface unseen, by rounding.
+    pub lost: f64,
+    /// What its skin shows.
+    pub patches: Vec<VolumePatch>,
+    /// The right light as a picture.
+    pub picture: Option<String>,
+}
+
+/// Pixels of a still that show the same kind of light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct VolumePatch {
+    /// `lit`, `terminator`, `thin` or `shadow`.
+    pub patch: String,
+    /// Their number.
+    pub pixels: usize,
+    /// Mean of the right light, R, G, B.
+    pub light: [f64; 3],
+    /// Standard error of the mean.
+    pub error: [f64; 3],
+}
+
+/// A method.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct VolumeChoice {
+    /// Its name.
+    pub name: String,
+    /// Its settings.
+    pub settings: Settings,
+    /// Root mean square over the stills of their relative RMSE.
+    pub relative_rmse: f64,
+    /// The largest of a still.
+    pub worst: f64,
+    /// Light over the right light less 1, by patch, all stills together.
+    pub bias: BTreeMap<String, f64>,
+    /// Each still.
+    pub points: Vec<VolumePoint>,
+}
+
+/// A method in a still.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "camelCase")]
+pub struct VolumePoint {
+    /// Relative RMSE of the light on skin, less what the noise of the right light adds.
+    pub relative_rmse: f64,
+    /// The same with that noise.
+    pub relative_rmse_with_noise: f64,
+    /// Light over the right light less 1, by patch.
+    pub bias: BTreeMap<String, f64>,
+    /// Its light as a picture.
+    pub picture: Option<String>,
+    /// Where it is too bright (red) and too dark (blue).
+    pub difference: Option<String>,
 }
 
 /// A page of pictures.

@@ -34,9 +34,9 @@ const BACKDROP_LINEAR: Vec3 = Vec3::new(0.016, 0.018, 0.021);
 /// Side of the skin colour table (see `rubor_rig::skin::chromophores` for its error).
 const COLOR_TABLE_SIDE: u32 = 64;
 /// Radius of a lamp with a place, metres: a soft box of 24 cm.
-const LAMP_RADIUS_METRES: f32 = 0.12;
+pub(crate) const LAMP_RADIUS_METRES: f32 = 0.12;
 /// Tangent of the angular radius of a directional light.
-const DISTANT_LAMP_RADIUS: f32 = 0.05;
+pub(crate) const DISTANT_LAMP_RADIUS: f32 = 0.05;
 
 /// Opens an adapter by its number or a part of its name, or the best one.
 ///
@@ -169,6 +169,11 @@ impl Studio {
     /// Notes on everything that loading environments left out, decoded or repaired since the last call.
     pub fn take_notes(&mut self) -> Vec<Note> {
         std::mem::take(&mut self.notes)
+    }
+
+    /// The colours of skin.
+    pub(crate) fn skin(&self) -> &SkinLookup {
+        &self.skin
     }
 
     /// Clears the history: the next frame is number `frame`, and temporal antialiasing mixes no previous frame into it.

@@ -253,3 +253,52 @@ fn a_chart_has_a_row_a_choice_its_pictures_and_its_page() {
     folder.refused(&[&small[..], &["--exposure", "nan"]].concat(), &["exposure"]);
     folder.refused(&[&small[..], &["--adapter", "abacus"]].concat(), &["abacus"]);
 }
+
+#[test]
+fn methods_stand_beside_the_volume_and_stills_go_to_other_programs() {
+    let folder = Folder::new();
+    folder.refused(&["chart", "--paths", "8"], &["--volume"]);
+    folder.refused(&["chart", "--volume", "--still", "nose"], &["\"nose\"", "shadow-edge"]);
+    folder.refused(&["chart", "--volume", "--export"], &["--output"]);
+    // Stills for other programs need no device.
+    let stills = folder.path("stills");
+    let small = ["chart", "--volume", "--still", "light-through-ear", "--size", "20x16", "--paths", "16"];
+    assert!(folder.run(&[&small[..], &["--export", "-o", &stills]].concat()).status.success());
+    let still = Path::new(&stills).join("light-through-ear");
+    let text = std::fs::read_to_string(still.join("scene.json")).expect("a scene");
+    let scene: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&scene["size"], &scene["closedRims"]), (&serde_json::json!([20, 16]), &serde_json::json!(1)));
+    assert_eq!(scene["lamps"][0]["kind"], "point");
+    for (name, bytes) in [("scattered", 12), ("scattered-error", 12), ("scattered-correlated", 12)] {
+        let found = std::fs::metadata(still.join(format!("{name}.f32"))).expect("a picture").len();
+        assert_eq!(found, 20 * 16 * bytes, "{name}");
+    }
+    let mesh = std::fs::read(still.join("surface.ply")).expect("a mesh");
+    assert!(mesh.starts_with(b"ply\nformat binary_little_endian 1.0\n"));
+    if !support::can_draw() {
+        return;
+    }
+    let out = folder.path("out");
+    let lists = ["--scatter", "none,separable:9", "--batches", "1", "--json", "-o", &out];
+    let report = folder.json(&[&small[..], &lists].concat());
+    let names: Vec<&Value> =
+        report["choices"].as_array().expect("choices").iter().map(|c| &c["name"]).collect();
+    assert_eq!(names, ["reference-screen", "none", "separable:9", "reference-surface:1"]);
+    let error = |c: usize| report["choices"][c]["relativeRmse"].as_f64().unwrap_or(f64::NAN);
+    // Without light that comes through the ear most of it is missing.
+    assert!(error(1) > 1.5 * error(2) && error(2) > 0.0 && error(2) < 1.0, "{report}");
+    assert!(report["stills"][0]["noise"].as_f64().is_some_and(|n| n > 0.0 && n < 0.5), "{report}");
+    for file in
+        ["truth.exr", "truth-error.exr", "truth.json", "truth.png", "none.png", "separable-9-difference.png"]
+    {
+        assert!(Path::new(&out).join("light-through-ear").join(file).is_file(), "{file}");
+    }
+    let page = std::fs::read_to_string(Path::new(&out).join("index.html")).expect("a page");
+    assert!(page.contains("light-through-ear/separable-9.png") && !page.contains("http://"));
+    // Read again, not drawn again, and the page once more from its report.
+    assert_eq!(folder.json(&[&small[..], &lists].concat())["stills"], report["stills"]);
+    let again = folder.path("again");
+    let json = Path::new(&out).join("volume.json").to_string_lossy().into_owned();
+    assert!(folder.run(&["chart", "--from", &json, "-o", &again]).status.success());
+    assert!(Path::new(&again).join("volume.csv").is_file());
+}

@@ -1,4 +1,4 @@
-//! Tables of docs/speed.md are those of the chart that lies in docs/figures.
+//! Tables of docs/speed.md and docs/benchmark.md are those of the files that lie in docs/figures.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -88,20 +88,111 @@ fn tables(lines: &[Line]) -> String {
     out
 }
 
+/// Puts text between marks of a page, or sees that it is there.
+fn check(page: &str, begin: &str, made: &str) {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let page = docs.join(page);
+    let text = std::fs::read_to_string(&page).expect("the page");
+    let (before, rest) = text.split_once(begin).expect("where the tables begin");
+    let (found, after) = rest.split_once(END).expect("where they end");
+    if std::env::var_os("RUBOR_UPDATE_DOCS").is_some() {
+        std::fs::write(&page, format!("{before}{begin}{made}{END}{after}")).expect("the page is written");
+        return;
+    }
+    assert_eq!(found, made, "{} is stale: RUBOR_UPDATE_DOCS=1 writes it anew", page.display());
+}
+
+fn figure(name: &str) -> Vec<BTreeMap<String, String>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/figures").join(name);
+    let text = std::fs::read_to_string(path).expect("a table");
+    let mut rows = text.lines().map(fields);
+    let names = rows.next().expect("names of columns");
+    rows.map(|row| names.iter().cloned().zip(row).collect()).collect()
+}
+
 #[test]
 fn tables_are_those_of_the_chart() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     let chart = std::fs::read_to_string(docs.join("figures/chart.csv")).expect("the chart");
-    let tables = tables(&lines(&chart));
-    let page = docs.join("speed.md");
-    let text = std::fs::read_to_string(&page).expect("the page");
-    let (before, rest) = text.split_once(BEGIN).expect("where the tables begin");
-    let (found, after) = rest.split_once(END).expect("where they end");
-    if std::env::var_os("RUBOR_UPDATE_DOCS").is_some() {
-        std::fs::write(&page, format!("{before}{BEGIN}{tables}{END}{after}")).expect("the page is written");
-        return;
+    check("speed.md", BEGIN, &tables(&lines(&chart)));
+}
+
+/// Methods beside the volume: errors of all stills and of the worst, bias by patch.
+fn volume_table(rows: &[BTreeMap<String, String>]) -> String {
+    const PATCHES: [&str; 4] = ["lit", "terminator", "thin", "shadow"];
+    let mut out = String::from(
+        "\n| method | relative RMSE | in the worst still | bias: lit | terminator | thin | shadow |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    let error = |row: &BTreeMap<String, String>| row["relative_rmse"].parse::<f64>().expect("an error");
+    for all in rows.iter().filter(|row| row["still"] == "all") {
+        let stills: Vec<_> =
+            rows.iter().filter(|row| row["choice"] == all["choice"] && row["still"] != "all").collect();
+        let worst = stills.iter().max_by(|a, b| error(a).total_cmp(&error(b))).expect("a still");
+        let mean = (stills.iter().map(|row| error(row).powi(2)).sum::<f64>() / stills.len() as f64).sqrt();
+        assert!((mean - error(all)).abs() < 2e-5, "{}: {mean} and {}", all["choice"], all["relative_rmse"]);
+        let bias = PATCHES.map(|patch| {
+            let bias = &all[&format!("bias_{patch}")];
+            bias.parse::<f64>().map_or("-".to_owned(), |b| format!("{:+.1} %", 100.0 * b))
+        });
+        let _ = writeln!(
+            out,
+            "| `{}` | {mean:.3} | {:.3} (`{}`) | {} |",
+            all["choice"],
+            error(worst),
+            worst["still"],
+            bias.join(" | ")
+        );
     }
-    assert_eq!(found, tables, "docs/speed.md is stale: RUBOR_UPDATE_DOCS=1 writes it anew");
+    out.push('\n');
+    out
+}
+
+#[test]
+fn the_table_of_methods_is_that_of_the_volume() {
+    const BEGIN: &str = "<!-- made from docs/figures/volume.csv: RUBOR_UPDATE_DOCS=1 cargo test -p rubor-tests --test figures -->\n";
+    check("benchmark.md", BEGIN, &volume_table(&figure("volume.csv")));
+}
+
+/// Other programs over ours: pictures by channel, and intervals that hold 1.
+fn agreement_table(rows: &[BTreeMap<String, String>]) -> String {
+    let mut out = String::from(
+        "\n| program | still | R | G | B | pixels: difference over noise | intervals of patches that hold 1 |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for pixels in rows.iter().filter(|row| row["patch"] == "pixels") {
+        let own: Vec<_> = (rows.iter())
+            .filter(|row| row["program"] == pixels["program"] && row["still"] == pixels["still"])
+            .filter(|row| row["patch"] != "pixels")
+            .collect();
+        let number = |row: &BTreeMap<String, String>, of: &str| row[of].parse::<f64>().expect("a number");
+        let ratio = |c: &str| {
+            let row = own.iter().find(|row| row["patch"] == "all" && row["channel"] == c).expect("a channel");
+            format!("{:.4} ± {:.4}", number(row, "ratio"), number(row, "interval95"))
+        };
+        let patches: Vec<_> = own.iter().filter(|row| row["patch"] != "all").collect();
+        let holds = patches
+            .iter()
+            .filter(|row| (number(row, "ratio") - 1.0).abs() <= number(row, "interval95"))
+            .count();
+        let _ = writeln!(
+            out,
+            "| {} | `{}` | {} | {} | {} | {:.3} | {holds} of {} |",
+            pixels["program"],
+            pixels["still"],
+            ratio("R"),
+            ratio("G"),
+            ratio("B"),
+            number(pixels, "over_noise"),
+            patches.len()
+        );
+    }
+    out.push('\n');
+    out
+}
+
+#[test]
+fn the_table_of_programs_is_that_of_their_pictures() {
+    const BEGIN: &str = "<!-- made from docs/figures/agreement.csv: RUBOR_UPDATE_DOCS=1 cargo test -p rubor-tests --test figures -->\n";
+    check("benchmark.md", BEGIN, &agreement_table(&figure("agreement.csv")));
 }
 
 #[test]

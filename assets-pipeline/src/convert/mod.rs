@@ -15,7 +15,6 @@
 //! all of these    --into_head-----> the maps of a head, with their provenance
 //! ```
 
-mod bvh;
 pub mod chromophores;
 pub mod crop;
 pub mod displacement;

@@ -11,10 +11,9 @@ use std::f32::consts::TAU;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use rubor_rig::bvh::Bvh;
 use rubor_rig::deform::{deform_points, point_normals};
 use rubor_rig::head::{Head, Material, Mesh, OcclusionChange};
-
-use super::bvh::Bvh;
 
 /// Rays start this far off the surface, as part of the head's height: 0.1 mm on an adult head.
 const START: f32 = 3e-4;

@@ -39,3 +39,4 @@ pub mod profile;
 pub mod report;
 pub mod table;
 pub mod transmittance;
+pub mod volume;

@@ -6,12 +6,14 @@ use rubor::auto::measured::{self, Measured};
 use rubor::auto::{Auto, Bound, Calibration, experiment};
 use rubor::measure::chart::{self, Effort, Measure, Options, RightLight, Suite, Timing, page, plot::number};
 use rubor::measure::stability;
+use rubor::measure::volume::{self, MediumName};
 use rubor::report::{ChartError, ChartGroup, ChartReport, StabilityReport};
 use rubor::{Failure, Outcome, Report, Studio, Watch, inputs, output};
 use rubor_renderer::settings::{ScatterMethod, Settings};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_rig::json;
+use serde_json::Value;
 
 use super::console::Progress;
 use super::settings_flags::{Choices, Purpose, SettingsFlags};
@@ -48,7 +50,7 @@ pub(crate) struct Arguments {
     /// visible differences; with --sequence the diffuse light too (EXR)
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Draw the page of a chart that was measured before: its chart.json
+    /// Draw the page of a chart that was measured before: its chart.json or volume.json
     #[arg(long, value_name = "FILE", requires = "output", conflicts_with_all = ["sequence", "head", "stability", "calibrate", "auto"])]
     from: Option<PathBuf>,
     /// In place of time and error: what methods do while one quantity moves in small steps (stability.svg, .csv, .json)
@@ -68,6 +70,22 @@ pub(crate) struct Arguments {
     /// chosen
     #[arg(long, conflicts_with_all = ["sequence", "stability", "calibrate"])]
     auto: bool,
+    /// In place of a chart: light of scattering methods beside paths traced through the volume of the head (index.html, volume.json,
+    /// volume.csv, stills.csv, pictures, and the right light of each still, which a later run with the same options reads again)
+    #[arg(long, conflicts_with_all = ["stability", "calibrate", "auto", "from"])]
+    volume: bool,
+    /// Paths of a pixel of --volume [default: 256; 64 for quick]
+    #[arg(long, value_name = "N", requires = "volume", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+    paths: Option<u32>,
+    /// Skin of --volume (Jensen et al. 2001)
+    #[arg(long, value_name = "NAME", requires = "volume", default_value = "skin1", value_parser = ["skin1", "skin2"])]
+    medium: String,
+    /// Stills of --volume by name; may be given again [default: all]
+    #[arg(long, value_name = "NAME", requires = "volume")]
+    still: Vec<String>,
+    /// In place of methods: write the stills of --volume for Mitsuba and Cycles (see tests/interchange/volume.sh)
+    #[arg(long, requires_all = ["volume", "output"])]
+    export: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -84,20 +102,30 @@ impl Purpose for Charting {
 }
 const SIZE: &str = "384x384";
 const QUICK_SIZE: [u32; 2] = [128, 128];
+const VOLUME_SIZE: [u32; 2] = [160, 160];
+/// Paths of a pixel of stills for other programs.
+const EXPORTED_PATHS: u32 = 1024;
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     if let (Some(path), Some(folder)) = (&arguments.from, &arguments.output) {
         return draw_again(path, folder);
     }
     let Choices { mut base, listed, held } = arguments.settings.choices()?;
+    let has_size = held.iter().chain(listed.iter().map(|(flag, _)| flag)).any(|flag| flag == "size");
     let loaded = inputs::head(arguments.head.as_deref())?;
     console::notes(&loaded.notes);
     let rig = inputs::rig(None, loaded.rig.clone())?;
+    if arguments.volume {
+        if !has_size {
+            base.output.size = VOLUME_SIZE;
+        }
+        return measure_volume(arguments, &loaded.head, &rig, &base, &listed);
+    }
     let mut studio = Studio::open(arguments.adapter.as_deref())?;
     let is_quick = arguments.suite.as_deref().map_or(studio.is_software(), |name| name == "quick");
     let (suite, [batches, samples, frames]) =
         if is_quick { (Suite::Quick, [8, 4, 2]) } else { (Suite::Whole, [64, 8, 20]) };
-    if is_quick && !held.iter().chain(listed.iter().map(|(flag, _)| flag)).any(|flag| flag == "size") {
+    if is_quick && !has_size {
         base.output.size = QUICK_SIZE;
     }
     let batches = arguments.batches.unwrap_or(batches);
@@ -134,12 +162,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         progress.end();
         return tell_stability(arguments, report?);
     }
-    let mut scenes = Vec::new();
-    for path in &arguments.sequence {
-        let (scene, notes) = chart::scene_of(path, &loaded.head, &rig)?;
-        console::notes(&notes);
-        scenes.push(scene);
-    }
+    let mut scenes = own_scenes(arguments, &loaded.head, &rig)?;
     if scenes.is_empty() {
         let (found, notes) = chart::scenes(suite, &loaded.head, &rig)?;
         console::notes(&notes);
@@ -166,6 +189,82 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     Ok(())
 }
 
+/// Scenes of the user.
+fn own_scenes(arguments: &Arguments, head: &Head, rig: &Rig) -> Outcome<Vec<chart::Scene>> {
+    let mut scenes = Vec::new();
+    for path in &arguments.sequence {
+        let (scene, notes) = chart::scene_of(path, head, rig)?;
+        console::notes(&notes);
+        scenes.push(scene);
+    }
+    Ok(scenes)
+}
+
+fn measure_volume(
+    arguments: &Arguments,
+    head: &Head,
+    rig: &Rig,
+    base: &Settings,
+    listed: &[(String, Vec<Value>)],
+) -> Outcome {
+    let suite = if arguments.suite.as_deref() == Some("quick") { Suite::Quick } else { Suite::Whole };
+    let mut stills = own_scenes(arguments, head, rig)?;
+    if stills.is_empty() {
+        let (found, notes) = volume::stills(suite, head, rig)?;
+        console::notes(&notes);
+        stills = found;
+    }
+    if !arguments.still.is_empty() {
+        let names: Vec<String> = stills.iter().map(|s| s.name.clone()).collect();
+        if let Some(name) = arguments.still.iter().find(|name| !names.contains(name)) {
+            return Err(Failure::input(format!(
+                "--still: found {name:?}, expected one of {}",
+                names.join(", ")
+            )));
+        }
+        stills.retain(|still| arguments.still.contains(&still.name));
+    }
+    let medium = if arguments.medium == "skin2" { MediumName::Skin2 } else { MediumName::Skin1 };
+    if let Some(folder) = &arguments.output {
+        output::folder(folder)?;
+    }
+    let mut progress = Progress::default();
+    if let (true, Some(folder)) = (arguments.export, &arguments.output) {
+        let (size, paths) = (base.output.size, arguments.paths.unwrap_or(EXPORTED_PATHS));
+        let written = volume::export::write(folder, head, &stills, medium, size, paths, &mut progress);
+        progress.end();
+        written?;
+        say!("{}", folder.display());
+        return Ok(());
+    }
+    let mut studio = Studio::open(arguments.adapter.as_deref())?;
+    let [batches, paths] = if suite == Suite::Quick { [8, 64] } else { [16, 256] };
+    let batches = arguments.batches.unwrap_or(batches);
+    ScatterMethod::ReferenceSurface(batches).validate().map_err(Failure::input)?;
+    let base = medium.settings(base)?;
+    let choices = volume::choices(&base, listed, batches)?;
+    let options =
+        volume::Options { medium, paths: arguments.paths.unwrap_or(paths), folder: arguments.output.clone() };
+    let report = volume::run(&mut studio, head, &base, &stills, &choices, &options, &mut progress);
+    progress.end();
+    console::notes(&studio.take_notes());
+    let report = report?;
+    let page = arguments.output.as_deref().map(|folder| volume::page::write(folder, &report)).transpose()?;
+    if arguments.json {
+        return print_json(&Report::Volume(report));
+    }
+    say!("{}", volume::page::about(&report));
+    say!("| method | {} |", volume::page::COLUMNS.join(" | "));
+    say!("| --- | {} |", ["---"; volume::page::COLUMNS.len()].join(" | "));
+    for choice in &report.choices {
+        say!("| `{}` | {} |", choice.name, volume::page::cells(choice).join(" | "));
+    }
+    if let Some(page) = page {
+        say!("{}", page.display());
+    }
+    Ok(())
+}
+
 /// The page of a report.
 fn draw_again(path: &Path, folder: &Path) -> Outcome {
     let text = json::read_text(path)?;
@@ -173,6 +272,11 @@ fn draw_again(path: &Path, folder: &Path) -> Outcome {
         Ok(Report::Chart(report)) => {
             output::folder(folder)?;
             say!("{}", page::write(folder, &report)?.display());
+            Ok(())
+        }
+        Ok(Report::Volume(report)) => {
+            output::folder(folder)?;
+            say!("{}", volume::page::write(folder, &report)?.display());
             Ok(())
         }
         Ok(_) => {

@@ -5,6 +5,7 @@ pub mod budget;
 pub mod chart;
 pub mod difference;
 pub mod stability;
+pub mod volume;
 
 use rubor_assets::files::plain_names;
 use rubor_renderer::settings::{Leaf, Settings, leaves};
