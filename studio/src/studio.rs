@@ -313,11 +313,8 @@ impl Studio {
 
 /// Coarser levels of a head, made when they are needed.
 fn ladder(head: &Head) -> Ladder {
-    let hair = SkinMaps {
-        hair: head.maps.hair.clone(),
-        hair_count: head.maps.hair_count,
-        ..SkinMaps::default()
-    };
+    let hair =
+        SkinMaps { hair: head.maps.hair.clone(), hair_count: head.maps.hair_count, ..SkinMaps::default() };
     let geometry = Head {
         name: head.name.clone(),
         mesh: head.mesh.clone(),

@@ -234,7 +234,8 @@ impl HeadOnGpu {
             let host = |triangle: u32| level.hosts[order[triangle as usize] as usize];
             // Frames draw no more than these.
             let drawn = drawn_hairs(self.grown_hairs, level.error_metres / ERROR_PIXELS) as usize;
-            let roots = moved_roots(&all[..drawn.min(all.len())], (head, &order), (&reduced, &level_order), host);
+            let roots =
+                moved_roots(&all[..drawn.min(all.len())], (head, &order), (&reduced, &level_order), host);
             let looks = Looks {
                 maps: self.maps.clone(),
                 authored: self.authored.as_ref().map(|a| a.of_level(gpu, &reduced)),

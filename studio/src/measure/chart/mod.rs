@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use rubor_renderer::settings::{ScatterMethod, Settings};
 
 pub use choices::{Effort, Group, Measure, RightLight, groups};
-pub use suite::{Scene, Suite, scene_of, scenes};
+pub use suite::{Scene, Suite, frames_of, scene_of, scenes};
 use truth::save_light;
 pub(crate) use truth::{Drawn, SETTLED_FRAMES, Truth, draw};
 
