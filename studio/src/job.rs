@@ -491,7 +491,7 @@ mod tests {
         wrong(
             "/auto/bound",
             serde_json::json!({ "flip": 0.1, "milliseconds": 1 }),
-            "an object with one name",
+            "a string, or an object with one name",
         );
         wrong("/auto/bound", serde_json::json!({ "flop": 0.1 }), "\"flip\"");
         wrong("/auto/bound", serde_json::json!("flip"), "expected");

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::{Auto, Bound, Chosen, Features, Outline};
 use crate::error::{Failure, Outcome};
-use crate::measure::chart::{Drawn, Measure, Scene, Truth, draw};
+use crate::measure::chart::{Drawn, Measure, Scene, Truth, WAKING_FRAMES, draw};
 use crate::report::{Adapter, AutoReport, AutoRow, median};
 use crate::studio::Studio;
 use crate::watch::Watch;
@@ -169,6 +169,10 @@ fn measure(
     }
     watch.end();
     let mut times = vec![vec![Vec::new(); scenes.len()]; all.len()];
+    // A device that has had nothing to do runs slower.
+    if let (Some(scene), Some(settings)) = (scenes.first(), all.last()) {
+        studio.measure(std::slice::from_ref(&scene.shot), 0.0, settings, WAKING_FRAMES, 1)?;
+    }
     watch.begin("combinations timed", u64::from(timing.rounds) * all.len() as u64);
     for _ in 0..timing.rounds {
         for (settings, times) in all.iter().zip(&mut times) {

@@ -128,7 +128,7 @@ pub fn run(
 ) -> Outcome<Budget> {
     let Bound::Flip(bound) = options.bound else {
         return Err(Failure::input(format!(
-            "found a bound of {}, expected flip=X: a head has no time of its own",
+            "found a bound of {}, expected flip=X",
             options.bound
         )));
     };

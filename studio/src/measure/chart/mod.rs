@@ -34,7 +34,7 @@ use crate::studio::Studio;
 use crate::watch::Watch;
 
 /// Frames that raise the clock of a graphics card.
-const WAKING_FRAMES: u32 = 600;
+pub(crate) const WAKING_FRAMES: u32 = 600;
 
 /// Repetitions of timing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
