@@ -349,6 +349,7 @@ fn wrong_words_are_refused() {
     with(&["--max-error", "ms=3"], &["ms=3", "expected flip=X"]);
     with(&["-o", &head], &["the head itself"]);
     with(&["-o", "head.usda"], &["ends in .glb"]);
+    with(&["-o", &folder.path("nowhere/a.glb")], &["no such folder"]);
     with(&[&joy], &["--sequence"]);
     with(&["--frames", "0"], &["--frames"]);
     folder.refused(&["--budget", "--head", &head], &["--sequence"]);
