@@ -254,13 +254,16 @@ fn a_smile_needs_no_frown_and_the_stated_error_is_that_of_the_file() {
     assert_eq!(number(&report, "/inputBytes"), came);
 }
 
+/// A picture, and its pixels that count.
+type Seen = (Pixels, Vec<bool>);
+
 /// Mean FLIP over the first head and the pixels around it, for each frame: written apart from the library's.
 fn errors(whole: &str, reduced: &str, sequence: &str, frames: &[u32]) -> Vec<f64> {
     let mut studio = Studio::open(None).expect("a device");
     let mut settings = draft();
     settings.output.channels = vec![Channel::Radiance];
     let (sequence, _) = inputs::sequence(Some(Path::new(sequence))).expect("a sequence");
-    let mut draw = |path: &str| -> Vec<(Pixels, Vec<bool>)> {
+    let mut draw = |path: &str| -> Vec<Seen> {
         let loaded = inputs::head(Some(Path::new(path))).expect("a head");
         let rig = loaded.rig.expect("a rig");
         let (evaluator, _) = Evaluator::new(&loaded.head, &rig, &sequence).expect("it fits");
@@ -288,7 +291,7 @@ fn errors(whole: &str, reduced: &str, sequence: &str, frames: &[u32]) -> Vec<f64
         frames.iter().map(one).collect()
     };
     let (right, test) = (draw(whole), draw(reduced));
-    let error = |((right, counts), (test, _)): (&(Pixels, Vec<bool>), &(Pixels, Vec<bool>))| {
+    let error = |((right, counts), (test, _)): (&Seen, &Seen)| {
         let map = flip::ldr(test, right, flip::PIXELS_PER_DEGREE);
         let counted: Vec<f64> =
             map.iter().zip(counts).filter(|(_, c)| **c).map(|(v, _)| f64::from(*v)).collect();
@@ -349,6 +352,7 @@ fn wrong_words_are_refused() {
     with(&["--max-error", "ms=3"], &["ms=3", "expected flip=X"]);
     with(&["-o", &head], &["the head itself"]);
     with(&["-o", "head.usda"], &["ends in .glb"]);
+    with(&["-o", &folder.path("nowhere/a.glb")], &["no such folder"]);
     with(&[&joy], &["--sequence"]);
     with(&["--frames", "0"], &["--frames"]);
     folder.refused(&["--budget", "--head", &head], &["--sequence"]);

@@ -161,6 +161,11 @@ fn check_output(path: &Path, head: Option<&Path>) -> Outcome {
     if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("glb")) {
         return Err(Failure::input(format!("{}: expected a name that ends in .glb", path.display())));
     }
+    // Said before the work, which is long.
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if folder.is_some_and(|folder| !folder.is_dir()) {
+        return Err(Failure::input(format!("{}: found no such folder to write to", path.display())));
+    }
     let real = |path: &Path| std::fs::canonicalize(path).ok();
     if head.is_some_and(|head| real(head).is_some() && real(head) == real(path)) {
         return Err(Failure::input(format!(

@@ -179,8 +179,22 @@ pub(super) fn subjects(head: &Head, hairs: u32, unused: &Reduction) -> Vec<Subje
     all
 }
 
+/// The part of its wrinkle map that goes with a zone: all of it with the last zone that is used, and equal parts with zones of which none
+/// is; else none.
+fn part_of_map(head: &Head, zone: usize, unused: &Reduction, bytes: u64) -> u64 {
+    let zones = &head.maps.zones;
+    let map = zones[zone].wrinkle_map;
+    let sharing: Vec<usize> = (0..zones.len()).filter(|i| zones[*i].wrinkle_map == map).collect();
+    let used: Vec<&usize> = sharing.iter().filter(|i| !unused.zones.contains(i)).collect();
+    match used[..] {
+        [] => bytes / sharing.len() as u64,
+        [only] if *only == zone => bytes,
+        _ => 0,
+    }
+}
+
 /// Bytes on the device of what only weights decide; of what shares a texture its part of it. `None` of anything else.
-pub(super) fn device_bytes(head: &Head, subject: Subject) -> Option<u64> {
+pub(super) fn device_bytes(head: &Head, subject: Subject, unused: &Reduction) -> Option<u64> {
     let texture = |name: &str| {
         footprint::of_maps(&head.maps).into_iter().find(|f| f.texture == name).map_or(0, |f| f.bytes)
     };
@@ -188,11 +202,9 @@ pub(super) fn device_bytes(head: &Head, subject: Subject) -> Option<u64> {
         Subject::Shape(i) => Some(DELTA_BYTES * changes(&head.shapes[i])),
         Subject::Distribution(_) => Some(texture("distributions") / head.maps.distributions.len() as u64),
         Subject::Zone(i) => {
-            let zones = &head.maps.zones;
-            let map = zones[i].wrinkle_map;
-            let sharing = zones.iter().filter(|z| z.wrinkle_map == map).count() as u64;
             let of_map = texture("wrinkles") / head.maps.wrinkle_slopes.len().max(1) as u64;
-            Some(texture("zone masks") / zones.len() as u64 + of_map / sharing.max(1))
+            let mask = texture("zone masks") / head.maps.zones.len() as u64;
+            Some(mask + part_of_map(head, i, unused, of_map))
         }
         _ => None,
     }
@@ -205,7 +217,13 @@ fn changes(shape: &BlendShape) -> u64 {
 }
 
 /// Bytes in a file of the whole head that going, or a level, saves.
-pub(super) fn file_bytes(head: &Head, sizes: &Sizes, subject: Subject, level: u32) -> u64 {
+pub(super) fn file_bytes(
+    head: &Head,
+    sizes: &Sizes,
+    subject: Subject,
+    level: u32,
+    unused: &Reduction,
+) -> u64 {
     let image = |name: &str| sizes.images.get(name).copied().unwrap_or(0);
     let maps = &head.maps;
     let wrinkles = |map: usize| image(&format!("wrinkle slopes {map}"));
@@ -224,9 +242,8 @@ pub(super) fn file_bytes(head: &Head, sizes: &Sizes, subject: Subject, level: u3
         Subject::Shape(i) => sizes.shapes.get(&head.shapes[i].name).copied().unwrap_or(0),
         Subject::Distribution(i) => of_distribution(i),
         Subject::Zone(i) => {
-            let map = maps.zones[i].wrinkle_map;
-            let sharing = maps.zones.iter().filter(|z| z.wrinkle_map == map).count() as u64;
-            mask(&maps.zones[i].name) + wrinkles(map as usize) / sharing.max(1)
+            let map = wrinkles(maps.zones[i].wrinkle_map as usize);
+            mask(&maps.zones[i].name) + part_of_map(head, i, unused, map)
         }
         Subject::Part(i) => sizes.parts.get(i).copied().unwrap_or(0),
         Subject::Map(kind) => smaller(match kind {
@@ -249,4 +266,29 @@ pub(super) fn pixels(shape: &BlendShape, index: usize, look: &Look, height: u32)
     let camera = &look.shot.camera;
     let distance = (camera.position - camera.target).length().max(1e-3);
     f64::from(metres * 0.5 * height as f32 / (distance * (0.5 * camera.fov_y).tan()))
+}
+
+#[cfg(test)]
+mod tests {
+    use rubor_rig::head::{SkinMaps, WrinkleZone};
+    use rubor_rig::map::Map;
+
+    use super::*;
+
+    #[test]
+    fn a_wrinkle_map_is_worth_something_to_its_last_zone_alone() {
+        let zone =
+            |wrinkle_map| WrinkleZone { name: String::new(), wrinkle_map, mask: Map::filled(1, 1, &[1.0]) };
+        let head = Head {
+            maps: SkinMaps { zones: [0, 0, 1].map(zone).to_vec(), ..SkinMaps::default() },
+            ..Head::default()
+        };
+        let parts = |unused: &[usize]| {
+            let unused = Reduction { zones: unused.iter().copied().collect(), ..Reduction::default() };
+            [0, 1, 2].map(|zone| part_of_map(&head, zone, &unused, 100))
+        };
+        assert_eq!(parts(&[]), [0, 0, 100]);
+        assert_eq!(parts(&[1]), [100, 0, 100]);
+        assert_eq!(parts(&[0, 1]), [50, 50, 100]);
+    }
 }

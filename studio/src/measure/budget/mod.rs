@@ -149,7 +149,7 @@ pub fn run(
     watch.begin("losses tried alone", all.len() as u64);
     let mut tried = Vec::new();
     for subject in all {
-        let file_bytes = |level: u32| file_bytes(head, &whole_sizes, subject, level);
+        let file_bytes = |level: u32| file_bytes(head, &whole_sizes, subject, level, &unused);
         tried.push(try_alone(&mut trials, subject, (&unused, saved), &names_held, bound, file_bytes)?);
         watch.step();
     }
@@ -279,7 +279,7 @@ fn try_alone(
     file_bytes: impl Fn(u32) -> u64,
 ) -> Outcome<Tried> {
     let head = trials.head;
-    let of_weights = device_bytes(head, subject);
+    let of_weights = device_bytes(head, subject, unused);
     let mut tried = Tried { subject, levels: Vec::new(), is_held: false };
     let is_unused = match subject {
         Subject::Shape(i) => unused.shapes.contains(&i),
