@@ -269,7 +269,7 @@ fn methods_stand_beside_the_volume_and_stills_go_to_other_programs() {
     let scene: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!((&scene["size"], &scene["closedRims"]), (&serde_json::json!([20, 16]), &serde_json::json!(1)));
     assert_eq!(scene["lamps"][0]["kind"], "point");
-    for (name, bytes) in [("scattered", 12), ("scattered-error", 12), ("scattered-correlated", 12)] {
+    for (name, bytes) in [("scattered", 12), ("scattered-error", 12), ("scattered-all-facets", 12)] {
         let found = std::fs::metadata(still.join(format!("{name}.f32"))).expect("a picture").len();
         assert_eq!(found, 20 * 16 * bytes, "{name}");
     }

@@ -14,7 +14,7 @@ import numpy
 mitsuba.set_variant("scalar_rgb")
 from mitsuba import ScalarTransform4f as Transform  # noqa: E402
 
-from volume_scene import PASSES, Scene, compare, write  # noqa: E402
+from volume_scene import PASSES, Scene, write  # noqa: E402
 
 
 def lamps(scene):
@@ -88,4 +88,4 @@ for folder in sys.argv[2:]:
     scene = Scene(folder)
     share = max(samples // PASSES, 1)
     passes = [drawn(scene, False, share, i) - drawn(scene, True, share, 100 + i) for i in range(PASSES)]
-    write(scene, "mitsuba", passes, compare(scene, passes, "scattered", f"Mitsuba {mitsuba.__version__}"))
+    write(scene, "mitsuba", f"Mitsuba {mitsuba.__version__}", passes)

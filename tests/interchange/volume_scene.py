@@ -55,7 +55,6 @@ def compare(scene, passes, ours, program):
     ours: name of our picture of the same definition.
     """
     light, error = scene.picture(ours), scene.picture(f"{ours}-error")
-    passes = numpy.stack(passes)
     assert len(passes) == PASSES and passes.shape[1:] == light.shape, passes.shape
     patches = scene.patches()
     rows = []
@@ -92,32 +91,31 @@ def compare(scene, passes, ours, program):
     return rows + [summary]
 
 
-def write(scene, program, passes, rows):
-    numpy.stack(passes).mean(axis=0).astype("<f4").tofile(scene.folder / f"{program}.f32")
-    (scene.folder / f"{program}.json").write_text(json.dumps(rows, indent=1) + "\n")
-    for row in rows:
-        if row["patch"] == "pixels":
-            print(f"{scene.name}, {program}: relative RMSE {row['relativeRmse']}, {row['overNoise']} times the noise", flush=True)
-        elif row["patch"] == "all":
-            print(f"{scene.name}, {program}, {row['channel']}: {row['ratio']} +- {row['interval95']}", flush=True)
+def write(scene, name, program, passes):
+    """Keeps pictures of a program; the comparison reads them."""
+    numpy.stack(passes).astype("<f4").tofile(scene.folder / f"{name}-passes.f32")
+    (scene.folder / f"{name}.json").write_text(json.dumps({"program": program}) + "\n")
+    print(f"{scene.name}: {program}", flush=True)
 
 
 def table(folder):
     """All comparisons below a folder as agreement.csv, and how many of them agree."""
     lines = ["program,still,patch,channel,pixels,ratio,interval95,over_noise"]
     agreeing, all_ratios = {}, {}
-    for file in sorted(Path(folder).glob("*/*.json")):
-        if file.name not in ("mitsuba.json", "cycles.json"):
-            continue
-        for row in json.loads(file.read_text()):
-            head = [row["program"], row["scene"], row["patch"], row.get("channel", ""), row["pixels"]]
-            if row["patch"] == "pixels":
-                lines.append(",".join(map(str, [*head, "", "", row["overNoise"]])))
-                continue
-            lines.append(",".join(map(str, [*head, row["ratio"], row["interval95"], ""])))
-            agreeing.setdefault(row["program"], []).append(row["agrees"])
-            if row["patch"] == "all":
-                all_ratios.setdefault(row["program"], []).append(row["ratio"])
+    for name, ours in (("mitsuba", "scattered"), ("cycles", "scattered-all-facets")):
+        for file in sorted(Path(folder).glob(f"*/{name}.json")):
+            scene = Scene(file.parent)
+            flat = numpy.fromfile(scene.folder / f"{name}-passes.f32", "<f4")
+            passes = flat.reshape(PASSES, scene.height, scene.width, 3).astype("f8")
+            for row in compare(scene, passes, ours, json.loads(file.read_text())["program"]):
+                head = [row["program"], row["scene"], row["patch"], row.get("channel", ""), row["pixels"]]
+                if row["patch"] == "pixels":
+                    lines.append(",".join(map(str, [*head, "", "", row["overNoise"]])))
+                    continue
+                lines.append(",".join(map(str, [*head, row["ratio"], row["interval95"], ""])))
+                agreeing.setdefault(row["program"], []).append(row["agrees"])
+                if row["patch"] == "all":
+                    all_ratios.setdefault(row["program"], []).append(row["ratio"])
     (Path(folder) / "agreement.csv").write_text("\n".join(lines) + "\n")
     for program, agrees in agreeing.items():
         ratios = all_ratios[program]

@@ -3,7 +3,7 @@
 //! ```text
 //! FOLDER/STILL/scene.json     camera, lamps, medium; lengths in mm, power at a metre
 //!              surface.ply    the closed surface, facets      blockers.ply   what is black
-//!              scattered.f32, scattered-correlated.f32        light that was scattered inside, for two ways of masking
+//!              scattered.f32, scattered-all-facets.f32        light that was scattered inside, for two boundaries (`Masking`)
 //!              ...-error.f32  its standard error              patches.u8     what each pixel shows, 255 for no skin
 //! ```
 //!
@@ -53,7 +53,7 @@ pub fn write(
         output::write(&folder.join("patches.u8"), &patches)?;
         let mut alpha = 0.0;
         for (masking, name) in
-            [(Masking::Separable, "scattered"), (Masking::HeightCorrelated, "scattered-correlated")]
+            [(Masking::Separable, "scattered"), (Masking::AllFacets, "scattered-all-facets")]
         {
             let (flesh, roughness) = medium.exported_flesh(masking)?;
             alpha = roughness;

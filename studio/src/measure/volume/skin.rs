@@ -28,7 +28,7 @@ const ETA: f64 = 1.4;
 /// Roughness of its boundary: alpha of GGX in the volume, m of Beckmann in real time, which is the same width of slopes. Skin has
 /// 0.2 to 0.4; what a rougher one loses to second microfacets would be the larger error
 /// ([`rubor_rig::skin::volume::Boundary`]).
-const ROUGHNESS: f32 = 0.1;
+const ROUGHNESS: f64 = 0.1;
 /// The same for scenes of other programs: their paths find a lamp through the boundary by chance, and the chance grows with its
 /// square.
 const EXPORTED_ROUGHNESS: f64 = 0.3;
@@ -106,7 +106,7 @@ impl MediumName {
 }
 
 /// Index and roughness of the boundary.
-pub const BOUNDARY: [f64; 2] = [ETA, ROUGHNESS as f64];
+pub const BOUNDARY: [f64; 2] = [ETA, ROUGHNESS];
 
 /// The head with maps that say the same everywhere.
 pub fn bare_head(head: &Head) -> Head {
@@ -115,7 +115,7 @@ pub fn bare_head(head: &Head) -> Head {
         melanin: even(&FRACTIONS[..1]),
         hemoglobin: even(&FRACTIONS[1..]),
         // Reflectance of the index 1.4.
-        specular: even(&[1.0, ROUGHNESS]),
+        specular: even(&[1.0, ROUGHNESS as f32]),
         scattering: even(&[1.0]),
         ..SkinMaps::default()
     };
