@@ -379,6 +379,10 @@ fn judge(
     );
     say!("| --- | --- | --- | --- | --- | --- | --- |");
     for r in &report.rows {
+        if r.possible == 0 {
+            say!("| {} | 0 | - | - | - | - | - |", r.bound);
+            continue;
+        }
         let fixed = r.over_fixed.map_or("-".to_owned(), |v| format!("{v:.2}"));
         say!(
             "| {} | {} | {} | {} | {:.2} | {fixed} | {:.4} |",
