@@ -526,7 +526,9 @@ impl<'de> de::Deserializer<'de> for Node<'_> {
             Value::Object(object) if object.properties.len() == 1 => {
                 visitor.visit_enum(MapAccessDeserializer::new(Members::of(object)))
             }
-            Value::Object(_) => Err(NodeError::new(String::new(), "a string, or an object with one name".to_owned())),
+            Value::Object(_) => {
+                Err(NodeError::new(String::new(), "a string, or an object with one name".to_owned()))
+            }
             _ => Err(NodeError::new(String::new(), "a string".to_owned())),
         };
         result.map_err(|error| error.at(self.0))

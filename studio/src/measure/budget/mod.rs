@@ -127,10 +127,7 @@ pub fn run(
     watch: &mut dyn Watch,
 ) -> Outcome<Budget> {
     let Bound::Flip(bound) = options.bound else {
-        return Err(Failure::input(format!(
-            "found a bound of {}, expected flip=X",
-            options.bound
-        )));
+        return Err(Failure::input(format!("found a bound of {}, expected flip=X", options.bound)));
     };
     let head = &scene.head;
     let sequences: Vec<Sequence> = scene.sequences.iter().map(|(_, sequence)| sequence.clone()).collect();
