@@ -267,7 +267,7 @@ mod tests {
             let b = Boundary { masking, ..boundary(0.3) };
             let (s, c) = tilt.to_radians().sin_cos();
             let (forward, right) = (Vec3::new(s, 0.0, c), Vec3::new(-c, 0.0, s));
-            let (n, half, mut sum) = (128, 25f32.to_radians().tan(), 0.0_f64);
+            let (n, half, mut sum) = (64, 25f32.to_radians().tan(), 0.0_f64);
             for i in 0..n * n {
                 let [x, y] = [i % n, i / n].map(|i| half * (2.0 * (i as f32 + 0.5) / n as f32 - 1.0));
                 let ray = (forward + x * right + y * Vec3::Y).normalize();
