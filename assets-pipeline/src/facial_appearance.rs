@@ -176,6 +176,9 @@ pub struct MapEntries {
     /// Albedo of that hair, linear Rec. 709.
     #[serde(skip_serializing_if = "is_black")]
     pub hair_color_linear: [f32; 3],
+    /// Most single hairs of the scalp that are drawn, standing for all that would grow.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hair_count: Option<u32>,
 }
 
 fn is_black(color: &[f32; 3]) -> bool {

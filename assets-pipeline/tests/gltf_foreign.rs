@@ -417,7 +417,7 @@ fn the_published_schema_names_the_properties() {
     let distribution = json!({"name": "joy", "scale": map, "bias": map});
     let maps = json!({
         "albedo": map, "melanin": map, "hemoglobin": map, "hemoglobinMean": map, "hair": map,
-        "hairColorLinear": [0.1, 0.1, 0.1], "slopes": map, "specular": map, "scattering": map,
+        "hairColorLinear": [0.1, 0.1, 0.1], "hairCount": 100, "slopes": map, "specular": map, "scattering": map,
         "wrinkleSlopes": [map], "zones": [zone], "distributions": [distribution],
     });
     let part = json!({"name": "p", "material": "other", "authored": true, "points": 1});

@@ -47,6 +47,8 @@ pub(crate) struct Appearance {
     pub(crate) maps: Vec<MapEntry>,
     #[serde(default)]
     pub(crate) hair_color_linear: [f32; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) hair_count: Option<u32>,
     /// The rig file, as it is: expressions and combination shapes have no nodes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) rig: Option<serde_json::Value>,
@@ -95,6 +97,7 @@ impl Appearance {
                 .collect(),
             maps: Vec::new(),
             hair_color_linear: head.maps.hair_color_linear,
+            hair_count: head.maps.hair_count,
             rig: None,
         };
         let mut files = Vec::new();
@@ -149,7 +152,8 @@ impl Appearance {
 
     /// Reads the maps beside the scene. Maps that cannot be read are named and left out.
     pub(crate) fn load_maps(&self, folder: &Path, notes: &mut Vec<String>) -> SkinMaps {
-        let mut maps = SkinMaps { hair_color_linear: self.hair_color_linear, ..SkinMaps::default() };
+        let (hair_color_linear, hair_count) = (self.hair_color_linear, self.hair_count);
+        let mut maps = SkinMaps { hair_color_linear, hair_count, ..SkinMaps::default() };
         let mut scales: BTreeMap<String, Map> = BTreeMap::new();
         for entry in &self.maps {
             let map = match load(entry, folder) {

@@ -41,7 +41,7 @@ pub use passes::antialias;
 pub use passes::diffusion::surface::BARE_SKIN;
 pub use renderer::{Drawn, FrameStats, Image, Renderer};
 pub use scene::{
-    Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind,
+    Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Ladder, Light, LightKind,
     MAX_DISTRIBUTIONS, MAX_HEADS, MAX_HEMOGLOBIN, MAX_LIGHTS, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
     NEAR_METRES, Scene, footprint,
 };

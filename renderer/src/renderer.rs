@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use serde::Serialize;
 
-use crate::channels::{Channel, ChannelData};
+use crate::channels::{Channel, ChannelData, Extent};
 use crate::device::readback::{Readback, TextureReadback};
 use crate::device::{FrameTimes, Gpu, Image as FrameImage, Images, PassTimer, PendingTimes, Recorder};
 use crate::error::RenderError;
@@ -14,9 +14,10 @@ use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::diffusion::{Needs, Prepared, surface};
 use crate::passes::geometry::raster::Rasteriser;
 use crate::scene::lamp::lamps;
+use crate::scene::level::levelled;
 use crate::scene::posed_head::{Instance, posed};
-use crate::scene::{MAX_HEADS, MAX_LIGHTS, Scene};
-use crate::settings::{RasterMethod, ScatterMethod, Settings, TransmitMethod};
+use crate::scene::{HeadInstance, MAX_HEADS, MAX_LIGHTS, Scene};
+use crate::settings::{DetailMethod, RasterMethod, ScatterMethod, Settings, TransmitMethod};
 
 /// A picture, rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -209,8 +210,8 @@ impl Renderer {
             });
         }
         let view = into.create_view(&Default::default());
-        self.prepare(scene, settings)?;
-        self.record_frame(encoder, scene, settings, Some(&view))?;
+        let heads = self.prepare(scene, settings)?;
+        self.record_frame(encoder, &Scene { heads: &heads, ..*scene }, settings, Some(&view))?;
         Ok(())
     }
 
@@ -220,7 +221,8 @@ impl Renderer {
     /// # Errors
     /// A size, a count or a value outside the limits; a method that does not draw in one go.
     pub fn draw(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<Drawn, RenderError> {
-        self.prepare(scene, settings)?;
+        let heads = self.prepare(scene, settings)?;
+        let scene = &Scene { heads: &heads, ..*scene };
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let image = self.record_frame(&mut encoder, scene, settings, None)?;
         self.hand_over(encoder, scene, settings, image, None)
@@ -246,7 +248,8 @@ impl Renderer {
         let ScatterMethod::ReferenceSurface(batches) = settings.quality.scatter else {
             return self.draw(scene, settings);
         };
-        self.prepare(scene, settings)?;
+        let heads = self.prepare(scene, settings)?;
+        let scene = &Scene { heads: &heads, ..*scene };
         let directional = settings.quality.profile.directional().is_some();
         self.passes.shade.prepare_samples(&self.gpu, directional);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
@@ -277,7 +280,8 @@ impl Renderer {
         warm_up: u32,
         frames: u32,
     ) -> Result<Vec<FrameTimes>, RenderError> {
-        self.prepare(scene, settings)?;
+        let heads = self.prepare(scene, settings)?;
+        let scene = &Scene { heads: &heads, ..*scene };
         let mut pending = VecDeque::new();
         let mut times = Vec::new();
         for frame in 0..warm_up + frames {
@@ -349,7 +353,7 @@ impl Renderer {
     }
 
     /// A channel of the last frame, which its settings have to name in [`crate::settings::Output::channels`]; those over
-    /// points and vertices are always there. Empty where the frame has no such channel.
+    /// points and vertices are always there, where they are not named those of the level that was drawn. Empty where the frame has no such channel.
     ///
     /// # Errors
     /// The device failed.
@@ -378,8 +382,12 @@ impl Renderer {
         }
     }
 
-    /// Checks a scene and makes the passes that its frames need.
-    fn prepare(&mut self, scene: &Scene<'_>, settings: &Settings) -> Result<(), RenderError> {
+    /// Checks a scene and makes the passes that its frames need. Returns its heads at the levels that are drawn.
+    fn prepare<'a>(
+        &mut self,
+        scene: &Scene<'a>,
+        settings: &Settings,
+    ) -> Result<Vec<HeadInstance<'a>>, RenderError> {
         if self.checked.as_ref() != Some(settings) {
             check_settings(&self.gpu, settings)?;
             self.checked = Some(settings.clone());
@@ -390,24 +398,41 @@ impl Renderer {
             self.past_shape = Some(shape);
             self.past.forget();
         }
-        for (i, placed) in scene.heads.iter().enumerate() {
-            if !self.instances.get(i).is_some_and(|instance| instance.fits(placed.head)) {
-                self.instances.truncate(i);
-                self.instances.push(Instance::new(&self.gpu, placed.head));
-                self.past.forget();
-            }
-        }
         let rasteriser = self.rasteriser(scene, settings);
         let profile = settings.quality.profile.shared();
         self.diffusion.prepare(&self.gpu, rasteriser, settings.quality.scatter, profile)?;
+        let needs = self.needs();
+        // Methods over the surface lay it out once; who reads points wants all of them.
+        let is_whole = needs.before_view
+            || matches!(settings.quality.scatter, ScatterMethod::ReferenceSurface(_))
+            || settings.output.channels.iter().any(|c| c.row().extent != Extent::Pixels);
+        let detail = if is_whole { DetailMethod::Full } else { settings.quality.detail };
+        let heads = levelled(&self.gpu, scene, detail, settings.frame_size());
+        let scene = &Scene { heads: &heads, ..*scene };
+        for instance in &mut self.instances {
+            instance.is_new = false;
+        }
+        for (i, placed) in heads.iter().enumerate() {
+            match self.instances.get_mut(i) {
+                Some(instance) if instance.fits(placed.head) => {}
+                Some(instance) if instance.is_of(placed.head) => {
+                    *instance = Instance::new(&self.gpu, placed.head);
+                }
+                _ => {
+                    self.instances.truncate(i);
+                    self.instances.push(Instance::new(&self.gpu, placed.head));
+                    self.past.forget();
+                }
+            }
+        }
         if self.passes.rasteriser != rasteriser {
             self.passes = Passes::new(&self.gpu, rasteriser);
         }
         if let Some(method) = &mut self.diffusion.method {
             method.take_heads(&self.gpu, scene.heads)?;
         }
-        let needs = self.needs();
-        self.passes.prepare(&self.gpu, scene, settings, &needs)
+        self.passes.prepare(&self.gpu, scene, settings, &needs)?;
+        Ok(heads)
     }
 
     /// What the settings ask for, as far as the device has the memory.
@@ -487,7 +512,7 @@ impl Renderer {
             + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
             + self.past.history.as_ref().map_or(0, History::memory_bytes)
-            + scene.heads.iter().map(|h| h.head.memory_bytes).sum::<u64>()
+            + scene.heads.iter().map(|h| h.head.total_bytes()).sum::<u64>()
     }
 }
 

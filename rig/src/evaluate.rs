@@ -97,7 +97,7 @@ pub struct Evaluator {
 }
 
 /// Shapes that [`crate::life`] moves.
-const LIVING_SHAPES: [&str; 12] = [
+pub(crate) const LIVING_SHAPES: [&str; 12] = [
     "eyeBlinkLeft",
     "eyeBlinkRight",
     "eyeLookOutLeft",

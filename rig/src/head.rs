@@ -205,6 +205,8 @@ pub struct SkinMaps {
     pub hair: Option<Map>,
     /// Albedo of that hair, linear Rec. 709.
     pub hair_color_linear: [f32; 3],
+    /// Most single hairs of the scalp that are drawn, standing for all that would grow; none draws all.
+    pub hair_count: Option<u32>,
 }
 
 /// A target hemoglobin distribution as local statistics (Jimenez 2012 eq. 7.5), low resolution.

@@ -19,7 +19,7 @@ use jsonc_parser::ast::{ObjectPropName, Value};
 use jsonc_parser::common::Ranged;
 use jsonc_parser::errors::ParseErrorKind;
 use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
-use serde::de::value::StrDeserializer;
+use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{self, DeserializeOwned, DeserializeSeed, IntoDeserializer, Visitor};
 use serde::forward_to_deserialize_any;
 
@@ -400,6 +400,8 @@ fn in_json_words(expected: &dyn de::Expected) -> String {
         "a map" => "an object".to_owned(),
         "a sequence" => "an array".to_owned(),
         "a boolean" => "true or false".to_owned(),
+        // A name that takes no value got one.
+        "unit" => "the name alone, as a string".to_owned(),
         words if words.starts_with("struct ") => "an object".to_owned(),
         words if words.starts_with("variant identifier") || words.starts_with("enum ") => {
             "a string".to_owned()
@@ -482,11 +484,7 @@ impl Node<'_> {
                 }
                 Ok(value)
             }
-            Value::Object(object) => visitor.visit_map(Members {
-                all: &object.properties,
-                next: 0,
-                seen: std::collections::HashSet::new(),
-            }),
+            Value::Object(object) => visitor.visit_map(Members::of(object)),
         }
     }
 }
@@ -524,6 +522,13 @@ impl<'de> de::Deserializer<'de> for Node<'_> {
                 let name: StrDeserializer<'_, NodeError> = s.value.as_ref().into_deserializer();
                 visitor.visit_enum(name)
             }
+            // A name with a value: {"name": value}.
+            Value::Object(object) if object.properties.len() == 1 => {
+                visitor.visit_enum(MapAccessDeserializer::new(Members::of(object)))
+            }
+            Value::Object(_) => {
+                Err(NodeError::new(String::new(), "a string, or an object with one name".to_owned()))
+            }
             _ => Err(NodeError::new(String::new(), "a string".to_owned())),
         };
         result.map_err(|error| error.at(self.0))
@@ -553,6 +558,12 @@ struct Members<'a> {
     all: &'a [jsonc_parser::ast::ObjectProp<'a>],
     next: usize,
     seen: std::collections::HashSet<&'a str>,
+}
+
+impl<'a> Members<'a> {
+    fn of(object: &'a jsonc_parser::ast::Object<'a>) -> Self {
+        Self { all: &object.properties, next: 0, seen: std::collections::HashSet::new() }
+    }
 }
 
 impl<'de> de::MapAccess<'de> for Members<'_> {

@@ -43,8 +43,33 @@ pub struct LoadedHead {
 /// # Errors
 /// A file that is missing or that is no head.
 pub fn head(path: Option<&Path>) -> Outcome<LoadedHead> {
-    let mut loaded = plain_head(path)?;
-    let about = path.unwrap_or(Path::new("built-in head")).display().to_string();
+    finished(plain_head(path)?, path.unwrap_or(Path::new(BUILT_IN)))
+}
+
+/// The head of a file in memory, as [`head`] would read it under this name.
+///
+/// # Errors
+/// As [`head`].
+pub fn head_of_bytes(bytes: &[u8], name: &Path) -> Outcome<LoadedHead> {
+    finished(plain_head_of_bytes(bytes, name)?, name)
+}
+
+/// Bytes of the file of a head, or of the built-in one.
+///
+/// # Errors
+/// The file is not there.
+pub fn head_file_bytes(path: Option<&Path>) -> Outcome<u64> {
+    match path {
+        None => Ok(DEFAULT_HEAD.len() as u64),
+        Some(path) => Ok(std::fs::metadata(path).map_err(|e| Failure::read(path, e))?.len()),
+    }
+}
+
+/// Name of the built-in head in messages.
+const BUILT_IN: &str = "built-in head";
+
+fn finished(mut loaded: LoadedHead, name: &Path) -> Outcome<LoadedHead> {
+    let about = name.display().to_string();
     loaded.notes.extend(keep_color(&mut loaded.head, &about, &own_color::Options::default())?);
     loaded.notes.extend(check::head::size(&loaded.head).map(|f| {
         let fix = f.fix.map(|fix| format!("; {fix}")).unwrap_or_default();
@@ -67,7 +92,6 @@ pub fn keep_color(head: &mut Head, name: &str, options: &own_color::Options) -> 
 /// # Errors
 /// As [`head`].
 pub fn plain_head(path: Option<&Path>) -> Outcome<LoadedHead> {
-    let name = path.unwrap_or(Path::new("built-in head"));
     let bytes = match path {
         None => std::borrow::Cow::Borrowed(DEFAULT_HEAD),
         Some(path) => {
@@ -75,7 +99,13 @@ pub fn plain_head(path: Option<&Path>) -> Outcome<LoadedHead> {
             limits::read(path).map_err(|e| Failure::read(path, e))?.into()
         }
     };
-    let imported = import::file::from_bytes(&bytes, name)?;
+    let loaded = plain_head_of_bytes(&bytes, path.unwrap_or(Path::new(BUILT_IN)))?;
+    let file = path.map(absolute).transpose()?;
+    Ok(LoadedHead { source: InputFile { file, ..loaded.source }, ..loaded })
+}
+
+fn plain_head_of_bytes(bytes: &[u8], name: &Path) -> Outcome<LoadedHead> {
+    let imported = import::file::from_bytes(bytes, name)?;
     let about = name.display().to_string();
     let notes: Vec<Note> = imported.notes.iter().map(|n| Note::new(about.as_str(), n.to_string())).collect();
     let rig = match imported.rig {
@@ -98,7 +128,7 @@ pub fn plain_head(path: Option<&Path>) -> Outcome<LoadedHead> {
         sequence,
         animation: imported.animation,
         extent: imported.extent,
-        source: InputFile { file: path.map(absolute).transpose()?, fingerprint: Fingerprint::of(&bytes) },
+        source: InputFile { file: None, fingerprint: Fingerprint::of(bytes) },
         notes,
     })
 }

@@ -447,6 +447,7 @@ impl JsonSchema for FrameList {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::auto::Calibration;
 
     fn job() -> Job {
         let sequence = r#"{ "fps": 23.976, "duration": 0.7, "size": [96, 64],
@@ -468,6 +469,33 @@ mod tests {
         let back = Job::from_json("job.json", &text, Path::new("/x"), None).unwrap();
         assert_eq!(back, job);
         assert_eq!(back.to_json().unwrap(), text);
+    }
+
+    #[test]
+    fn a_job_that_chooses_its_settings_reads_back_and_wrong_wishes_are_told() {
+        let mut job = job();
+        for bound in ["flip=0.02", "ms=1.5"] {
+            let (bound, held) = (bound.parse().unwrap(), vec!["scatter".to_owned()]);
+            job.auto = Some(Auto { bound, held, calibration: Calibration::shipped().unwrap() });
+            let text = job.to_json().unwrap();
+            let back = Job::from_json("job.json", &text, Path::new("/x"), None).unwrap();
+            assert_eq!(back, job);
+        }
+        let wrong = |place: &str, value: Value, phrase: &str| {
+            let mut written: Value = serde_json::from_str(&job.to_json().unwrap()).unwrap();
+            *written.pointer_mut(place).unwrap() = value;
+            let error = Job::from_json("job.json", &written.to_string(), Path::new("/x"), None).unwrap_err();
+            assert!(error.to_string().contains(phrase), "{error}");
+        };
+        wrong("/auto/bound", serde_json::json!({ "flip": -1 }), "found -1");
+        wrong(
+            "/auto/bound",
+            serde_json::json!({ "flip": 0.1, "milliseconds": 1 }),
+            "a string, or an object with one name",
+        );
+        wrong("/auto/bound", serde_json::json!({ "flop": 0.1 }), "\"flip\"");
+        wrong("/auto/bound", serde_json::json!("flip"), "expected");
+        wrong("/auto/held/0", serde_json::json!("scater"), "scater");
     }
 
     #[test]

@@ -1,4 +1,6 @@
-//! Reports: the measurements of a job (`stats.json`), a benchmark, a chart, a gallery.
+//! Reports: the measurements of a job (`stats.json`), a benchmark, a chart, a budget, a gallery.
+
+mod budget;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -9,6 +11,11 @@ use rubor_renderer::settings::Settings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+
+pub use budget::{
+    BudgetCoding, BudgetError, BudgetFate, BudgetFrame, BudgetItem, BudgetKind, BudgetReport, BudgetSequence,
+    BudgetTotals,
+};
 
 use crate::measure::chart::Measure;
 use crate::measure::volume::MediumName;
@@ -28,6 +35,8 @@ pub enum Report {
     Stability(StabilityReport),
     /// Choices of `auto` beside every fixed setting.
     Auto(AutoReport),
+    /// What sequences need of a head.
+    Budget(BudgetReport),
     /// Light of methods beside that of the volume.
     Volume(VolumeReport),
     /// A page of pictures.
@@ -283,6 +292,9 @@ pub struct ChartError {
     /// Its 99th percentile.
     #[serde(rename = "flip99")]
     pub flip_99: f64,
+    /// Relative RMSE of the displayed picture in linear light, over the same pixels.
+    #[serde(default)]
+    pub relative_rmse: f64,
     /// Relative RMSE of diffuse radiance before albedo, on skin, to `reference-surface`; only where the measure is light.
     pub relative_rmse_to_surface: Option<f64>,
     /// The same to `reference-screen`.

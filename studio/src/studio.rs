@@ -8,17 +8,20 @@
 //! This is the only file that knows the renderer's `Renderer` and how a device is opened.
 
 use std::rc::Rc;
+use std::sync::Arc;
 
 use glam::{Mat4, Vec3};
 use image::RgbImage;
+use rubor_assets::convert::levels;
 use rubor_renderer::channels::ChannelData;
 use rubor_renderer::settings::{RasterMethod, Settings};
 use rubor_renderer::{
     AdapterDescription, Camera, ColorTable, Environment, FrameStats, FrameTimes, Gpu, HeadInstance,
-    HeadOnGpu, Image, Light, LightKind, Renderer, Scene, native,
+    HeadOnGpu, Image, Ladder, Light, LightKind, Renderer, Scene, native,
 };
+use rubor_rig::authored::Authored;
 use rubor_rig::evaluate::{LightState, Shot};
-use rubor_rig::head::Head;
+use rubor_rig::head::{Head, SkinMaps};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinLookup, SkinModel};
 
 use crate::environment;
@@ -128,6 +131,16 @@ impl Studio {
         self.renderer.gpu().has_timestamps
     }
 
+    /// Bytes of the heads on the device, with what frames write of them.
+    pub fn head_bytes(&self) -> u64 {
+        self.heads.iter().map(|head| head.bytes_in_scene()).sum()
+    }
+
+    /// Single hairs of the scalps of all heads: those on the device.
+    pub fn hairs(&self) -> u32 {
+        self.heads.iter().map(|head| head.hair_counts()[0]).sum()
+    }
+
     /// Replaces the heads; a frame takes one shot per head, in this order. One that is there several times is kept once.
     ///
     /// # Errors
@@ -141,7 +154,10 @@ impl Studio {
                 known.iter().find(|(other, _)| std::ptr::eq(*other, head)).map(|(_, kept)| kept.clone());
             let on_gpu = match kept {
                 Some(kept) => kept,
-                None => Rc::new(HeadOnGpu::new(self.renderer.gpu(), head, &color)?),
+                None => {
+                    let on_gpu = HeadOnGpu::new(self.renderer.gpu(), head, &color)?;
+                    Rc::new(on_gpu.with_ladder(ladder(head)))
+                }
             };
             known.push((head, on_gpu));
         }
@@ -293,6 +309,29 @@ impl Studio {
         }
         Ok(())
     }
+}
+
+/// Coarser levels of a head, made when they are needed.
+fn ladder(head: &Head) -> Ladder {
+    let hair =
+        SkinMaps { hair: head.maps.hair.clone(), hair_count: head.maps.hair_count, ..SkinMaps::default() };
+    let geometry = Head {
+        name: head.name.clone(),
+        mesh: head.mesh.clone(),
+        shapes: head.shapes.clone(),
+        maps: hair,
+        authored: Authored {
+            images: Vec::new(),
+            materials: head.authored.materials.clone(),
+            of_parts: head.authored.of_parts.clone(),
+            second_uvs: head.authored.second_uvs.clone(),
+            colors_linear: head.authored.colors_linear.clone(),
+            normals: head.authored.normals.clone(),
+        },
+        landmarks: head.landmarks.clone(),
+        provenance: Vec::new(),
+    };
+    Ladder::new(Arc::new(geometry), levels::levels, levels::least_error_metres(head))
 }
 
 fn light(state: &LightState) -> Light {

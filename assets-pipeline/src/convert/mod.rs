@@ -11,6 +11,7 @@
 //! rest mesh       --occlusion-----> ambient visibility of each point
 //! a whole figure  --crop----------> its head, chosen parts
 //! lengths         --size----------> metres, with a guess of the unit
+//! triangles       --levels--------> coarser surfaces for where the head is small in the picture
 //! all of these    --into_head-----> the maps of a head, with their provenance
 //! ```
 
@@ -19,6 +20,8 @@ pub mod crop;
 pub mod displacement;
 pub mod hemoglobin;
 pub mod into_head;
+pub mod levels;
+mod nearest;
 pub mod normals;
 pub mod occlusion;
 pub mod own_color;

@@ -4,21 +4,18 @@
 //! through the landmarks that both have; each of its texels then takes the nearest skin of the giver. Texture layouts,
 //! seams and topology do not matter.
 
-use std::collections::HashMap;
-
-use glam::{DVec3, IVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use rubor_rig::head::{Head, Material};
 
 use super::ConvertError;
+use super::nearest::Surface;
 use super::skin_texels::SkinTexels;
-use super::transfer::{Warp, nearest_in_triangle};
+use super::transfer::Warp;
 
 /// Landmarks that a warp needs at least: they must span space.
 const LEAST_LANDMARKS: usize = 4;
-/// Cells of the search grid along the longest side of a head: some ten triangles each.
-const CELLS: f32 = 48.0;
 
 /// Where each texel of a map of the receiver lies in the texture of the giver. Texels without skin have the place of
 /// the texture coordinate itself: nothing reads them.
@@ -99,13 +96,10 @@ impl Bend {
     }
 }
 
-/// Skin triangles of a head in a grid.
+/// The skin of a head and its texture coordinates.
 struct Skin {
-    triangles: Vec<[(Vec3, Vec2); 3]>,
-    cells: HashMap<IVec3, Vec<u32>>,
-    cell_metres: f32,
-    low: IVec3,
-    high: IVec3,
+    surface: Surface,
+    uvs: Vec<[Vec2; 3]>,
 }
 
 impl Skin {
@@ -122,69 +116,20 @@ impl Skin {
             .flat_map(|p| &mesh.triangles[p.triangles.start as usize..p.triangles.end as usize])
             .map(|t| t.map(corner))
             .collect();
-        let extent = head.bounds().map_or(0.0, |(low, high)| (high - low).max_element());
-        if triangles.is_empty() || extent <= 0.0 {
+        let uvs = triangles.iter().map(|t| t.map(|c| c.1)).collect();
+        let surface = Surface::new(triangles.iter().map(|t| t.map(|c| c.0)).collect()).ok_or_else(|| {
             let found = format!("head {:?} without skin", head.name);
-            return Err(ConvertError::argument("giver", found, "triangles of the material skin"));
-        }
-        let cell_metres = extent / CELLS;
-        let mut skin =
-            Self { triangles, cells: HashMap::new(), cell_metres, low: IVec3::MAX, high: IVec3::MIN };
-        for (i, t) in skin.triangles.iter().enumerate() {
-            let [a, b, c] = t.map(|c| c.0);
-            let (low, high) = (skin.cell(a.min(b).min(c)), skin.cell(a.max(b).max(c)));
-            for z in low.z..=high.z {
-                for y in low.y..=high.y {
-                    for x in low.x..=high.x {
-                        skin.cells.entry(IVec3::new(x, y, z)).or_default().push(i as u32);
-                    }
-                }
-            }
-            (skin.low, skin.high) = (skin.low.min(low), skin.high.max(high));
-        }
-        Ok(skin)
-    }
-
-    fn cell(&self, p: Vec3) -> IVec3 {
-        (p / self.cell_metres).floor().as_ivec3()
+            ConvertError::argument("giver", found, "triangles of the material skin")
+        })?;
+        Ok(Self { surface, uvs })
     }
 
     /// Texture coordinate of the nearest skin.
     fn nearest(&self, p: Vec3) -> Vec2 {
-        let middle = self.cell(p);
-        // Shells of cells about the point until no farther shell can hold anything nearer.
-        let inside = middle.clamp(self.low, self.high);
-        let first = (middle - inside).abs().max_element();
-        let last = first + (self.high - self.low).max_element() + 1;
-        let mut best = (f32::INFINITY, Vec2::ZERO);
-        for shell in first..=last {
-            if best.0 <= (shell - 1).max(0) as f32 * self.cell_metres {
-                break;
-            }
-            for cell in shell_cells(shell).map(|c| middle + c) {
-                for i in self.cells.get(&cell).into_iter().flatten() {
-                    let [a, b, c] = self.triangles[*i as usize];
-                    let w = nearest_in_triangle(p, a.0, b.0, c.0);
-                    let d = (a.0 * w.x + b.0 * w.y + c.0 * w.z).distance(p);
-                    if d < best.0 {
-                        best = (d, a.1 * w.x + b.1 * w.y + c.1 * w.z);
-                    }
-                }
-            }
-        }
-        best.1
+        let place = self.surface.nearest(p);
+        let [a, b, c] = self.uvs[place.triangle];
+        a * place.weights.x + b * place.weights.y + c * place.weights.z
     }
-}
-
-/// Offsets of the cells at a Chebyshev distance.
-fn shell_cells(n: i32) -> impl Iterator<Item = IVec3> {
-    (-n..=n).flat_map(move |z| {
-        (-n..=n).flat_map(move |y| {
-            let is_face = z.abs() == n || y.abs() == n;
-            let step = if is_face || n == 0 { 1 } else { 2 * n };
-            (-n..=n).step_by(step as usize).map(move |x| IVec3::new(x, y, z))
-        })
-    })
 }
 
 #[cfg(test)]
@@ -222,9 +167,6 @@ mod tests {
         let skin = Skin::new(&sheet(Vec2::ZERO, Vec2::ONE)).unwrap();
         assert!(skin.nearest(Vec3::new(0.25, 0.75, 9.0)).distance(Vec2::new(0.25, 0.25)) < 1e-5);
         assert!(skin.nearest(Vec3::new(7.0, -4.0, 0.1)).distance(Vec2::ONE) < 1e-5);
-        let shell: Vec<_> = shell_cells(2).collect();
-        assert_eq!(shell.len(), 5 * 5 * 5 - 27);
-        assert_eq!(shell_cells(0).count(), 1);
     }
 
     #[test]

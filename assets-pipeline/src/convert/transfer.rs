@@ -14,6 +14,7 @@ use rubor_rig::skin::chromophores::MAX_HEMOGLOBIN;
 use serde::{Deserialize, Serialize};
 
 use super::ConvertError;
+use super::nearest::nearest_in_triangle;
 
 /// How a bias crosses from one blood level to another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -180,33 +181,6 @@ fn skin_coordinate(head: &Head, at: Vec3) -> Option<Vec2> {
         }
     }
     best.map(|(_, uv)| uv)
-}
-
-/// Barycentric weights of the point of a triangle nearest to `p`.
-pub(super) fn nearest_in_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let (d00, d01, d11, d20, d21) = (ab.dot(ab), ab.dot(ac), ac.dot(ac), ap.dot(ab), ap.dot(ac));
-    let det = d00 * d11 - d01 * d01;
-    if det > 1e-20 {
-        let (v, w) = ((d11 * d20 - d01 * d21) / det, (d00 * d21 - d01 * d20) / det);
-        if v >= 0.0 && w >= 0.0 && v + w <= 1.0 {
-            return Vec3::new(1.0 - v - w, v, w);
-        }
-    }
-    // Outside: the nearest point lies on an edge.
-    let edge = |from: Vec3, to: Vec3| {
-        let d = to - from;
-        let t = ((p - from).dot(d) / d.length_squared().max(1e-20)).clamp(0.0, 1.0);
-        ((from + d * t).distance_squared(p), t)
-    };
-    let (e0, e1, e2) = (edge(a, b), edge(b, c), edge(c, a));
-    if e0.0 <= e1.0 && e0.0 <= e2.0 {
-        Vec3::new(1.0 - e0.1, e0.1, 0.0)
-    } else if e1.0 <= e2.0 {
-        Vec3::new(0.0, 1.0 - e1.1, e1.1)
-    } else {
-        Vec3::new(e2.1, 0.0, 1.0 - e2.1)
-    }
 }
 
 /// A giver's distribution for a receiver, at the size of the receiver's mean.

@@ -289,6 +289,7 @@ fn synthesize_with(
         scattering,
         hair,
         hair_color_linear: hair_color_linear(options.hair_melanin, options.grey_hair),
+        hair_count: None,
     })
 }
 

@@ -75,7 +75,8 @@ impl ImageSpec {
         Self { layers, is_array: true, ..self }
     }
 
-    fn bytes(&self) -> u64 {
+    /// Bytes on the device.
+    pub(crate) fn bytes(&self) -> u64 {
         let texel = u64::from(self.format.block_copy_size(None).unwrap_or(4));
         u64::from(self.size[0]) * u64::from(self.size[1]) * u64::from(self.layers) * texel
     }

@@ -63,6 +63,7 @@ pub(crate) struct GpuAuthoredVertex {
 }
 
 /// Materials of the parts of a head that are drawn with those of their author.
+#[derive(Clone)]
 pub(crate) struct AuthoredOnGpu {
     pub(crate) materials: wgpu::Buffer,
     pub(crate) vertices: wgpu::Buffer,
@@ -148,11 +149,9 @@ impl AuthoredOnGpu {
             mipmap_filter: wgpu::MipmapFilterMode::Linear,
             ..Default::default()
         });
-        let vertices: Vec<GpuAuthoredVertex> =
-            (0..head.mesh.vertices.len() as u32).map(|v| gpu_vertex(authored, v)).collect();
         Ok(Some(Self {
             materials: gpu.storage("authored materials", &materials),
-            vertices: gpu.storage("authored vertices", &vertices),
+            vertices: vertices(gpu, head),
             colors: colors.upload(gpu, "authored colours", &authored.images, true)?,
             data: data.upload(gpu, "authored values", &authored.images, false)?,
             repeat,
@@ -160,7 +159,18 @@ impl AuthoredOnGpu {
     }
 }
 
+fn vertices(gpu: &Gpu, head: &Head) -> wgpu::Buffer {
+    let of = |v| gpu_vertex(&head.authored, v);
+    let vertices: Vec<GpuAuthoredVertex> = (0..head.mesh.vertices.len() as u32).map(of).collect();
+    gpu.storage("authored vertices", &vertices)
+}
+
 impl AuthoredOnGpu {
+    /// The same materials for other vertices.
+    pub(crate) fn of_level(&self, gpu: &Gpu, head: &Head) -> Self {
+        Self { vertices: vertices(gpu, head), ..self.clone() }
+    }
+
     /// What tells colour and alpha of a place.
     pub(crate) fn resources(&self) -> [Resource<'_>; 4] {
         [

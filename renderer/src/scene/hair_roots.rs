@@ -16,6 +16,10 @@ pub(crate) struct Root {
     pub(crate) look: u32,
 }
 
+/// Width of a hair at its root, metres.
+pub(crate) const WIDTH_METRES: f32 = 0.00014;
+/// Width in pixels of the hairs that are drawn, together with those that they stand for.
+const PIXELS_OF_HAIR: f32 = 0.35;
 /// Hairs per square metre of fully covered skin: 110 per square centimetre, about half of a real scalp; the tint of the
 /// map stands for the rest.
 const DENSITY: f32 = 1.1e6;
@@ -139,6 +143,54 @@ pub(crate) fn roots(head: &Head, triangles: &[[u32; 4]]) -> Vec<Root> {
     mixed(all, &mut random)
 }
 
+/// How many of the hairs, the first ones, stand for all where a pixel has a width.
+pub(crate) fn drawn_hairs(all: u32, pixel_metres: f32) -> u32 {
+    let share = (WIDTH_METRES / (PIXELS_OF_HAIR * pixel_metres)).min(1.0);
+    ((share * all as f32).ceil() as u32).clamp(1.min(all), all)
+}
+
+/// Roots of a head on the triangles of a level: each at the place of its host that is nearest within its plane. Both heads
+/// come with the order of their triangles; `host` gives the triangle of the level's mesh.
+pub(crate) fn moved_roots(
+    roots: &[Root],
+    (head, order): (&Head, &[u32]),
+    (level, level_order): (&Head, &[u32]),
+    host: impl Fn(u32) -> u32,
+) -> Vec<Root> {
+    let mut number = vec![0; level.mesh.triangles.len()];
+    for (i, t) in level_order.iter().enumerate() {
+        number[*t as usize] = i as u32;
+    }
+    let corners = |head: &Head, t: u32| {
+        head.mesh.triangles[t as usize]
+            .map(|v| head.mesh.points[head.mesh.vertices[v as usize].point as usize])
+    };
+    let moved = |root: &Root| {
+        let [a, b, c] = corners(head, order[root.triangle as usize]);
+        let [x, y] = unpack_unorm(root.weights);
+        let place = x * a + y * b + (1.0 - x - y) * c;
+        let [along_1, along_2] = unpack_half(root.flow);
+        let flow_metres = along_1 * (b - a) + along_2 * (c - a);
+        let triangle = host(root.triangle);
+        let [a, b, c] = corners(level, triangle);
+        let (e1, e2) = (b - a, c - a);
+        let normal = e1.cross(e2);
+        let area = normal.length_squared().max(f32::MIN_POSITIVE);
+        // Weights of the foot of the perpendicular, brought into the triangle.
+        let of_b = (place - a).cross(e2).dot(normal) / area;
+        let of_c = e1.cross(place - a).dot(normal) / area;
+        let weights = Vec3::new(1.0 - of_b - of_c, of_b, of_c).max(Vec3::ZERO);
+        let weights = weights / weights.element_sum();
+        Root {
+            triangle: number[triangle as usize],
+            weights: pack_unorm(weights.x, weights.y),
+            flow: pack_half(flow(flow_metres, [e1, e2], normal.normalize_or(Vec3::Y))),
+            look: root.look,
+        }
+    };
+    roots.iter().map(moved).collect()
+}
+
 /// The hairs in random order (Fisher and Yates), so that any number of the first ones stands for all.
 fn mixed(mut all: Vec<Root>, random: &mut Random) -> Vec<Root> {
     for i in (1..all.len()).rev() {
@@ -161,6 +213,14 @@ fn flow(away: Vec3, [e1, e2]: [Vec3; 2], normal: Vec3) -> [f32; 2] {
 fn pack_unorm(x: f32, y: f32) -> u32 {
     let half = |v: f32| (v.clamp(0.0, 1.0) * 65535.0).round() as u32;
     half(x) | half(y) << 16
+}
+
+fn unpack_unorm(bits: u32) -> [f32; 2] {
+    [bits & 0xffff, bits >> 16].map(|v| v as f32 / 65535.0)
+}
+
+fn unpack_half(bits: u32) -> [f32; 2] {
+    [bits as u16, (bits >> 16) as u16].map(|v| half::f16::from_bits(v).to_f32())
 }
 
 fn pack_half([x, y]: [f32; 2]) -> u32 {

@@ -1,12 +1,13 @@
 //! A head on the device: geometry for the kernels, maps as textures. Never changes after upload.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use rubor_rig::head::{
     BASE_COLOR_F0, BlendShape, Head, Material, OcclusionChange, Provenance, ProvenanceKind, SKIN_F0, Vertex,
 };
+use rubor_rig::level::Level;
 use rubor_rig::map::Map;
 use rubor_rig::mask::{Mask, resize_area};
 use wgpu::util::DeviceExt;
@@ -14,7 +15,9 @@ use wgpu::util::DeviceExt;
 use super::authored::AuthoredOnGpu;
 use super::clusters::{Cluster, clusters};
 use super::footprint::{APPEARANCE_SIZE, largest_of, mask_size, slope_size};
-use super::hair_roots::roots;
+use super::hair_roots::{Root, drawn_hairs, moved_roots, roots};
+use super::level::ERROR_PIXELS;
+use super::posed_head::instance_bytes;
 use crate::device::kernel::Resource;
 use crate::device::texture::{self, Texel};
 use crate::device::{Bind, Gpu};
@@ -77,7 +80,10 @@ pub struct HeadOnGpu {
     pub(crate) ring_starts: wgpu::Buffer,
     pub(crate) ring: wgpu::Buffer,
     pub(crate) hair_roots: wgpu::Buffer,
+    /// Hairs of the scalp on the device: the first of those that grow, in random order.
     pub(crate) hair_root_count: u32,
+    /// Hairs that grow, for which these stand.
+    pub(crate) grown_hairs: u32,
     pub(crate) maps: Option<MapsOnGpu>,
     pub(crate) authored: Option<AuthoredOnGpu>,
     pub(crate) skin_color: wgpu::TextureView,
@@ -88,7 +94,10 @@ pub struct HeadOnGpu {
     pub(crate) clusters: Vec<Cluster>,
     /// Its opaque surface at rest, for methods that lay it out.
     pub(crate) surface: Arc<Surface>,
-    /// Bytes of buffers and textures on the device.
+    /// Shared by its levels alone.
+    pub(crate) family: Arc<()>,
+    ladder: Option<Ladder>,
+    /// Bytes of buffers and textures on the device; of a level, those of all levels.
     pub memory_bytes: u64,
 }
 
@@ -101,6 +110,38 @@ pub(crate) struct Surface {
     pub(crate) triangles: Vec<[u32; 4]>,
 }
 
+/// How coarser levels of a head are made.
+pub struct Ladder {
+    head: Arc<Head>,
+    make: fn(&Head) -> Vec<Level>,
+    least_error_metres: f32,
+    /// Coarser geometry with the maps of the head and how far it is off, metres, finest first.
+    levels: OnceLock<Vec<(f32, HeadOnGpu)>>,
+}
+
+impl Ladder {
+    /// `make` returns levels of `head`, finest first, none of which is off by less than `least_error_metres`. Of the maps of
+    /// `head` only that of hair is read.
+    pub fn new(head: Arc<Head>, make: fn(&Head) -> Vec<Level>, least_error_metres: f32) -> Self {
+        Self { head, make, least_error_metres, levels: OnceLock::new() }
+    }
+}
+
+/// Hairs of the scalp that a head has at most.
+fn most_hairs(head: &Head) -> usize {
+    head.maps.hair_count.map_or(usize::MAX, |most| most as usize)
+}
+
+/// What the levels of a head share.
+struct Looks {
+    maps: Option<MapsOnGpu>,
+    authored: Option<AuthoredOnGpu>,
+    skin_color: wgpu::TextureView,
+    mm_per_texture: f32,
+    grown_hairs: u32,
+}
+
+#[derive(Clone)]
 pub(crate) struct MapsOnGpu {
     pub(crate) skin: wgpu::TextureView,
     /// Specular intensity and roughness; with a colour of its own that colour, and in alpha the intensity over the reflectance
@@ -147,6 +188,80 @@ impl HeadOnGpu {
         limit("number of hemoglobin distributions", head.maps.distributions.len(), MAX_DISTRIBUTIONS)?;
         limit("number of wrinkle zones", head.maps.zones.len(), MAX_ZONES)?;
 
+        let (triangles, _) = ordered_triangles(head);
+        let mut hair_roots = roots(head, &triangles);
+        let grown_hairs = hair_roots.len() as u32;
+        hair_roots.truncate(most_hairs(head));
+        let texels = color.texels.iter().map(|c| [c[0], c[1], c[2], 1.0]).collect();
+        let skin_color =
+            texture::upload_half(gpu, "skin colour", [color.width, color.height], &[vec![texels]]);
+        let looks = Looks {
+            maps: upload_maps(gpu, head),
+            authored: AuthoredOnGpu::new(gpu, head)?,
+            skin_color,
+            mm_per_texture: mm_per_texture(head),
+            grown_hairs,
+        };
+        let mut result = Self::of(gpu, head, bounds, looks, &hair_roots);
+        result.memory_bytes = result.count_bytes();
+        Ok(result)
+    }
+
+    /// Lets frames in which it is small draw coarser levels. They are made when a frame first needs one.
+    pub fn with_ladder(mut self, ladder: Ladder) -> Self {
+        self.ladder = Some(ladder);
+        self
+    }
+
+    /// Its coarsest geometry that is off by no more than a distance, metres.
+    pub(crate) fn at(&self, gpu: &Gpu, error_metres: f32) -> &Self {
+        let Some(ladder) = self.ladder.as_ref().filter(|l| error_metres >= l.least_error_metres) else {
+            return self;
+        };
+        let levels =
+            ladder.levels.get_or_init(|| self.levels(gpu, &ladder.head, &(ladder.make)(&ladder.head)));
+        levels.iter().rfind(|(error, _)| *error <= error_metres).map_or(self, |(_, level)| level)
+    }
+
+    fn levels(&self, gpu: &Gpu, head: &Head, levels: &[Level]) -> Vec<(f32, Self)> {
+        let order = triangle_order(head).0;
+        let (triangles, _) = ordered_triangles(head);
+        let mut all = roots(head, &triangles);
+        all.truncate(most_hairs(head));
+        let of = |level: &Level| {
+            let reduced = head.at_level(level);
+            let level_order = triangle_order(&reduced).0;
+            let host = |triangle: u32| level.hosts[order[triangle as usize] as usize];
+            // Frames draw no more than these.
+            let drawn = drawn_hairs(self.grown_hairs, level.error_metres / ERROR_PIXELS) as usize;
+            let roots =
+                moved_roots(&all[..drawn.min(all.len())], (head, &order), (&reduced, &level_order), host);
+            let looks = Looks {
+                maps: self.maps.clone(),
+                authored: self.authored.as_ref().map(|a| a.of_level(gpu, &reduced)),
+                skin_color: self.skin_color.clone(),
+                mm_per_texture: self.mm_per_texture,
+                grown_hairs: self.grown_hairs,
+            };
+            let mut geometry = Self::of(gpu, &reduced, self.bounds, looks, &roots);
+            geometry.family = self.family.clone();
+            geometry.memory_bytes = geometry.count_bytes() - geometry.map_bytes();
+            (level.error_metres, geometry)
+        };
+        let mut levels: Vec<_> = levels.iter().map(of).collect();
+        let total = self.memory_bytes + levels.iter().map(|(_, l)| l.memory_bytes).sum::<u64>();
+        levels.iter_mut().for_each(|(_, l)| l.memory_bytes = total);
+        levels
+    }
+
+    /// Bytes on the device of it and of the levels that were made.
+    pub(crate) fn total_bytes(&self) -> u64 {
+        let made = self.ladder.as_ref().and_then(|l| l.levels.get()?.first());
+        made.map_or(self.memory_bytes, |(_, level)| level.memory_bytes)
+    }
+
+    fn of(gpu: &Gpu, head: &Head, bounds: (Vec3, Vec3), looks: Looks, hair_roots: &[Root]) -> Self {
+        let mesh = &head.mesh;
         let occlusion = |p: usize| mesh.occlusion.get(p).copied().unwrap_or(1.0);
         let rest: Vec<[f32; 4]> =
             mesh.points.iter().enumerate().map(|(i, p)| p.extend(occlusion(i)).to_array()).collect();
@@ -166,13 +281,7 @@ impl HeadOnGpu {
         let corners = triangles[..opaque as usize].iter().flat_map(|t| &t[..3]);
         let opaque_points: Vec<u32> = corners.map(|v| mesh.vertices[*v as usize].point).collect();
         let (ring_starts, ring) = rings(head, &triangles);
-        let maps = upload_maps(gpu, head);
-        let hair_roots = roots(head, &triangles);
-        let texels = color.texels.iter().map(|c| [c[0], c[1], c[2], 1.0]).collect();
-        let skin_color =
-            texture::upload_half(gpu, "skin colour", [color.width, color.height], &[vec![texels]]);
-
-        let mut result = Self {
+        Self {
             point_count: mesh.points.len() as u32,
             vertex_count: mesh.vertices.len() as u32,
             opaque_points: index_buffer(gpu, &opaque_points),
@@ -188,28 +297,39 @@ impl HeadOnGpu {
             triangles: gpu.storage("triangles", &triangles),
             ring_starts: gpu.storage("ring starts", &ring_starts),
             ring: gpu.storage("rings", &ring),
-            hair_roots: gpu.storage("hair roots", &hair_roots),
+            hair_roots: gpu.storage("hair roots", hair_roots),
             hair_root_count: hair_roots.len() as u32,
-            maps,
-            authored: AuthoredOnGpu::new(gpu, head)?,
-            skin_color,
+            grown_hairs: looks.grown_hairs,
+            maps: looks.maps,
+            authored: looks.authored,
+            skin_color: looks.skin_color,
             bounds,
-            mm_per_texture: mm_per_texture(head),
+            mm_per_texture: looks.mm_per_texture,
             clusters: clusters(head),
             surface: Arc::new(Surface {
                 points: mesh.points.clone(),
                 vertices: mesh.vertices.clone(),
                 triangles: triangles[..opaque as usize].to_vec(),
             }),
+            family: Arc::default(),
+            ladder: None,
             memory_bytes: 0,
-        };
-        result.memory_bytes = result.count_bytes();
-        Ok(result)
+        }
     }
 
     /// Triangles that go through the visibility buffer, and those that are blended over the picture.
     pub fn triangle_counts(&self) -> (u32, u32) {
         (self.opaque_triangles, self.overlay_triangles)
+    }
+
+    /// Bytes on the device for this head in a scene: [`HeadOnGpu::memory_bytes`] and what frames write of it.
+    pub fn bytes_in_scene(&self) -> u64 {
+        self.memory_bytes + instance_bytes(self)
+    }
+
+    /// Single hairs of the scalp: those on the device, and those that grow.
+    pub fn hair_counts(&self) -> [u32; 2] {
+        [self.hair_root_count, self.grown_hairs]
     }
 
     /// The undeformed points: a buffer of this head alone.
@@ -322,10 +442,26 @@ fn merged_changes(shape: &BlendShape) -> Vec<(u32, Vec3, u32)> {
     }
 }
 
-/// Triangles with the numbers of their material (see `authored.wesl`): opaque ones first, the last of them those with holes,
+/// Triangles of the device's list with the numbers of their material (see `authored.wesl`), and counts as [`triangle_order`].
+fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 4]) {
+    let (order, counts) = triangle_order(head);
+    let mut numbers = vec![0; head.mesh.triangles.len()];
+    for (index, part) in head.mesh.parts.iter().enumerate() {
+        let authored = head.needed_material(index).map_or(0, |m| m + 1);
+        let number = part.material.number() | authored << AUTHORED_SHIFT;
+        numbers[part.triangles.start as usize..part.triangles.end as usize].fill(number);
+    }
+    let triangle = |i: &u32| {
+        let [a, b, c] = head.mesh.triangles[*i as usize];
+        [a, b, c, numbers[*i as usize]]
+    };
+    (order.iter().map(triangle).collect(), counts)
+}
+
+/// Triangles of a head in the order of the device's list: opaque ones first, the last of them those with holes,
 /// of these the last ones those that are seen through; then overlays; hidden ones are left out. How many are opaque, have
 /// holes, are seen through, and are overlays.
-fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 4]) {
+fn triangle_order(head: &Head) -> (Vec<u32>, [u32; 4]) {
     // Backs of parts with one side are holes too; skin has two.
     let has_holes = |part: usize| {
         let material = head.needed_material(part).map(|m| &head.authored.materials[m as usize]);
@@ -337,16 +473,10 @@ fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 4]) {
         let material = head.authored_material(part).map(|m| &head.authored.materials[m as usize]);
         material.is_some_and(|m| m.is_see_through())
     };
-    let of = |wanted: &dyn Fn(usize, Material) -> bool| -> Vec<[u32; 4]> {
+    let of = |wanted: &dyn Fn(usize, Material) -> bool| -> Vec<u32> {
         (head.mesh.parts.iter().enumerate())
             .filter(|(index, part)| wanted(*index, part.material))
-            .flat_map(|(index, part)| {
-                let authored = head.needed_material(index).map_or(0, |m| m + 1);
-                let number = part.material.number() | authored << AUTHORED_SHIFT;
-                head.mesh.triangles[part.triangles.start as usize..part.triangles.end as usize]
-                    .iter()
-                    .map(move |t| [t[0], t[1], t[2], number])
-            })
+            .flat_map(|(_, part)| part.triangles.clone())
             .collect()
     };
     let mut triangles = of(&|i, m| m.is_opaque() && !has_holes(i));

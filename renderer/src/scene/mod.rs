@@ -11,13 +11,15 @@ pub mod footprint;
 pub(crate) mod hair_roots;
 pub(crate) mod head;
 pub(crate) mod lamp;
+pub(crate) mod level;
 pub(crate) mod placement;
 pub(crate) mod posed_head;
 pub(crate) mod view;
 
 pub use environment::{Environment, EnvironmentMap};
 pub use head::{
-    ColorTable, HeadOnGpu, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
+    ColorTable, HeadOnGpu, Ladder, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS,
+    MAX_ZONES,
 };
 pub(crate) use posed_head::PosedHead;
 

@@ -1,5 +1,7 @@
 //! A head of a scene with its buffers of the frame, as passes receive it.
 
+use std::sync::Arc;
+
 use glam::Mat4;
 use rubor_rig::face_state::FaceState;
 
@@ -46,6 +48,9 @@ pub(crate) struct Instance {
     blood: Image,
     wrinkle_weights: Image,
     hairs: wgpu::Buffer,
+    family: Arc<()>,
+    /// Whether no frame has used it yet, so that it has no previous positions.
+    pub(crate) is_new: bool,
 }
 
 /// Four wrinkle maps have their weights in one layer.
@@ -66,6 +71,8 @@ impl Instance {
             blood: Image::new(gpu, "blood", ImageSpec::light(side)),
             wrinkle_weights,
             hairs: gpu.storage_zeroed("hairs", hair_bytes(head)),
+            family: head.family.clone(),
+            is_new: true,
         }
     }
 
@@ -77,11 +84,26 @@ impl Instance {
             && self.hairs.size() == hair_bytes(head).max(16)
     }
 
+    /// Whether it is that of a level of the same head.
+    pub(crate) fn is_of(&self, head: &HeadOnGpu) -> bool {
+        Arc::ptr_eq(&self.family, &head.family)
+    }
+
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
         let buffers = [&self.positions, &self.previous_positions, &self.tangent_frames, &self.hairs];
         buffers.iter().map(|b| b.size()).sum::<u64>() + self.blood.bytes() + self.wrinkle_weights.bytes()
     }
+}
+
+/// Bytes that [`Instance::new`] takes for a head.
+pub(crate) fn instance_bytes(head: &HeadOnGpu) -> u64 {
+    let blood = ImageSpec::light([APPEARANCE_SIZE; 2]);
+    let weights =
+        ImageSpec::storage([APPEARANCE_SIZE; 2], wgpu::TextureFormat::Rgba8Unorm).layers(layers(head));
+    let points = (u64::from(head.point_count) * 16).max(16);
+    let frames = (u64::from(head.vertex_count) * FRAME_BYTES).max(16);
+    2 * points + frames + hair_bytes(head).max(16) + blood.bytes() + weights.bytes()
 }
 
 fn hair_bytes(head: &HeadOnGpu) -> u64 {
@@ -104,7 +126,11 @@ pub(crate) fn posed<'a>(
         state: placed.state,
         world_from_head: world_from_head(placed),
         positions: &buffers.positions,
-        previous_positions: if has_past { &buffers.previous_positions } else { &buffers.positions },
+        previous_positions: if has_past && !buffers.is_new {
+            &buffers.previous_positions
+        } else {
+            &buffers.positions
+        },
         kept_positions: &buffers.previous_positions,
         tangent_frames: &buffers.tangent_frames,
         blood: &buffers.blood,

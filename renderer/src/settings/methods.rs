@@ -397,9 +397,10 @@ groups! {
     }
     /// What is drawn of things that are smaller than a pixel.
     DetailMethod, "detail", "Things smaller than a pixel" {
-        /// Fewer and denser hairs where a pixel is wider than a hair.
-        Auto, "auto", Geometry, "Cook et al. 2007";
-        /// All of them.
+        /// Coarser levels of a head while they are off by less than an eighth of a pixel; fewer and denser hairs where a pixel
+        /// is wider than a hair.
+        Auto, "auto", Geometry, "Garland and Heckbert 1997; Cook et al. 2007";
+        /// All triangles and hairs.
         Full, "full", Geometry, "";
     }
     /// Antialiasing of the displayed picture.

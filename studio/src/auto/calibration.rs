@@ -1,6 +1,6 @@
 //! Estimates of error and cost, fitted to a chart of random shots.
 //!
-//! The error of a choice, as mean FLIP, is `d exp(c . f)`: `f` are the logarithm of the millimetres of a pixel, its square, the
+//! The error of a choice, as mean FLIP and as relative RMSE, is `d exp(c . f)`: `f` are the logarithm of the millimetres of a pixel, its square, the
 //! logarithm of the share of the picture, backlight and contrast; `d` is the weight that drives it (wrinkles, blood), or 1.
 //! Least squares with a small ridge; a margin on top covers 95 % of the shots, each predicted without itself. The cost over
 //! that of the cheapest choice is linear in the pixels of the head.
@@ -12,8 +12,7 @@ use rubor_renderer::settings::{Leaf, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::features::Features;
-use crate::measure::chart::Measure;
-use crate::report::{Adapter, ChartReport};
+use crate::report::{Adapter, ChartError, ChartReport};
 
 /// Errors below this are none: a hundredth of a grey level over the whole head.
 const LEAST_ERROR: f64 = 2e-5;
@@ -47,6 +46,41 @@ impl Drive {
     }
 }
 
+/// An error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Metric {
+    /// Mean FLIP over the head.
+    Flip,
+    /// Relative RMSE of the displayed picture in linear light, over the same pixels.
+    RelativeRmse,
+}
+
+/// An estimate of an error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Estimate {
+    /// Coefficients of its logarithm.
+    coefficients: [f64; TERMS],
+    /// Added to that logarithm, so that 95 % of shots lie below.
+    margin: f64,
+}
+
+impl Estimate {
+    /// Fits errors over their drive, and covers 95 % of them; none if there are too few.
+    fn of(rows: &[([f64; TERMS], f64)]) -> Option<Self> {
+        if rows.len() < 2 * TERMS {
+            return None;
+        }
+        let coefficients = fit(rows)?;
+        let left_out = (0..rows.len()).filter_map(|i| {
+            let mut others = rows.to_vec();
+            let (terms, value) = others.remove(i);
+            Some(value - dot(&fit(&others)?, &terms))
+        });
+        Some(Self { coefficients, margin: quantile(left_out.collect(), COVERED).max(0.0) })
+    }
+}
+
 /// Estimates for a choice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -55,10 +89,10 @@ pub struct Choice {
     pub value: serde_json::Value,
     /// Its name.
     pub name: String,
-    /// Coefficients of the logarithm of the error; none where the choice is right by definition.
-    error: Option<[f64; TERMS]>,
-    /// Added to that logarithm, so that 95 % of shots lie below.
-    margin: f64,
+    /// Mean FLIP over the head; none where the choice is right by definition.
+    flip: Option<Estimate>,
+    /// Relative RMSE of the displayed picture in linear light, likewise.
+    relative_rmse: Option<Estimate>,
     /// Milliseconds over the first choice: constant, and per million pixels of the head's box.
     cost_ms: [f64; 2],
 }
@@ -149,33 +183,25 @@ impl Calibration {
             let first = (0..group.choices.len()).find(|c| is_timed(*c))?;
             let mut choices = Vec::new();
             for (c, choice) in group.choices.iter().enumerate().filter(|(c, _)| is_timed(*c)) {
-                let rows: Vec<([f64; TERMS], f64)> = (choice.points.iter().zip(features))
-                    .filter(|(_, f)| f.share > 0.0 && drive.of(f) >= LEAST_DRIVE)
-                    .map(|(p, f)| {
-                        let error = p.error.of(Measure::Picture) / drive.of(f);
-                        (terms(f), error.max(LEAST_ERROR).ln())
-                    })
-                    .collect();
-                let is_right = choice.points.iter().all(|p| p.error.of(Measure::Picture) < LEAST_ERROR);
-                let (error, margin) = if is_right {
-                    (None, 0.0)
-                } else {
-                    if rows.len() < 2 * TERMS {
-                        return None;
-                    }
-                    let model = fit(&rows)?;
-                    let left_out = (0..rows.len()).filter_map(|i| {
-                        let mut others = rows.clone();
-                        let (terms, value) = others.remove(i);
-                        Some(value - dot(&fit(&others)?, &terms))
-                    });
-                    (Some(model), quantile(left_out.collect(), COVERED).max(0.0))
+                let rows = |of: fn(&ChartError) -> f64| -> Vec<([f64; TERMS], f64)> {
+                    (choice.points.iter().zip(features))
+                        .filter(|(_, f)| f.share > 0.0 && drive.of(f) >= LEAST_DRIVE)
+                        .map(|(p, f)| (terms(f), (of(&p.error) / drive.of(f)).max(LEAST_ERROR).ln()))
+                        .collect()
+                };
+                let is_right = choice.points.iter().all(|p| p.error.flip_mean < LEAST_ERROR);
+                let (flip, relative_rmse) = match is_right {
+                    true => (None, None),
+                    false => (
+                        Some(Estimate::of(&rows(|e| e.flip_mean))?),
+                        Some(Estimate::of(&rows(|e| e.relative_rmse))?),
+                    ),
                 };
                 choices.push(Choice {
                     value: value_of(&choice.settings, &group.flag)?,
                     name: choice.name.clone(),
-                    error,
-                    margin,
+                    flip,
+                    relative_rmse,
                     cost_ms: line(&over(times, features, |s| [[g, c, s], [g, first, s]])),
                 });
             }
@@ -208,15 +234,19 @@ impl Calibration {
         Some(calibration)
     }
 
-    /// Estimated mean FLIP of a choice, which 95 % of shots do not exceed.
-    pub fn error(&self, group: usize, choice: usize, f: &Features) -> f64 {
+    /// Estimated error of a choice, which 95 % of shots do not exceed.
+    pub fn error(&self, metric: Metric, group: usize, choice: usize, f: &Features) -> f64 {
         let Some((group, choice)) = self.groups.get(group).and_then(|g| Some((g, g.choices.get(choice)?)))
         else {
             return 0.0;
         };
-        match &choice.error {
-            Some(model) if f.share > 0.0 => {
-                (group.drive.of(f) * (dot(model, &terms(f)) + choice.margin).exp()).min(1.0)
+        let estimate = match metric {
+            Metric::Flip => &choice.flip,
+            Metric::RelativeRmse => &choice.relative_rmse,
+        };
+        match estimate {
+            Some(e) if f.share > 0.0 => {
+                (group.drive.of(f) * (dot(&e.coefficients, &terms(f)) + e.margin).exp()).min(1.0)
             }
             _ => 0.0,
         }

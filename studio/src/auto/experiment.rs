@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::{Auto, Bound, Chosen, Features, Outline};
 use crate::error::{Failure, Outcome};
-use crate::measure::chart::{Drawn, Measure, Scene, Truth, draw};
+use crate::measure::chart::{Drawn, Measure, Scene, Truth, WAKING_FRAMES, draw};
 use crate::report::{Adapter, AutoReport, AutoRow, median};
 use crate::studio::Studio;
 use crate::watch::Watch;
@@ -144,7 +144,7 @@ fn measure(
 ) -> Outcome<Measured> {
     let combinations = combinations(auto);
     let settings = |c: &Vec<Option<usize>>| {
-        let chosen = Chosen { choices: c.clone(), flip: 0.0, milliseconds: 0.0, is_kept: true };
+        let chosen = Chosen { choices: c.clone(), ..Chosen::default() };
         auto.settings(base, &chosen)
     };
     let all: Vec<Settings> = combinations.iter().map(settings).collect::<Outcome<_>>()?;
@@ -169,6 +169,10 @@ fn measure(
     }
     watch.end();
     let mut times = vec![vec![Vec::new(); scenes.len()]; all.len()];
+    // A device that has had nothing to do runs slower.
+    if let (Some(scene), Some(settings)) = (scenes.first(), all.last()) {
+        studio.measure(std::slice::from_ref(&scene.shot), 0.0, settings, WAKING_FRAMES, 1)?;
+    }
     watch.begin("combinations timed", u64::from(timing.rounds) * all.len() as u64);
     for _ in 0..timing.rounds {
         for (settings, times) in all.iter().zip(&mut times) {
@@ -215,8 +219,7 @@ mod tests {
             errors: vec![vec![0.5, 0.5], vec![0.01, 0.1], vec![0.0, 0.0]],
             ms: vec![vec![1.0, 1.0], vec![2.0, 2.0], vec![4.0, 4.0]],
         };
-        let chosen =
-            |c: usize| Chosen { choices: vec![Some(c)], flip: 0.0, milliseconds: 0.0, is_kept: true };
+        let chosen = |c: usize| Chosen { choices: vec![Some(c)], ..Chosen::default() };
         let found = row(0.02, &measured, &[chosen(1), chosen(2)]);
         assert_eq!((found.possible, found.kept), (2, 2));
         assert_eq!((found.over_cheapest, found.over_fixed), (1.0, Some(6.0 / 8.0)));

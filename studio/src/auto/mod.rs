@@ -6,8 +6,8 @@
 //!                                             bound, choices of the frame before / --> choices of the frame, and why
 //! ```
 //!
-//! The error is the mean FLIP over the head against the same frame with the last choice of every group; errors of groups add
-//! up. Choices follow from the sequence alone, frame by frame from the first: any part of a job, on any machine, draws the
+//! The error is the mean FLIP over the head, or the relative RMSE, against the same frame with the last choice of every group;
+//! errors of groups add up. Choices follow from the sequence alone, frame by frame from the first: any part of a job, on any machine, draws the
 //! frames of the whole. The estimates are those of one device ([`Calibration`]); the job holds them.
 //!
 //! A frame has one choice for all of its heads: that of the head with the largest error.
@@ -25,6 +25,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 pub use calibration::Calibration;
+use calibration::Metric;
 pub use features::{Features, Outline};
 pub use shots::CALIBRATED;
 
@@ -47,12 +48,18 @@ const MOST_COMBINATIONS: usize = 100_000;
 pub enum Bound {
     /// Mean FLIP over the head, above 0.
     Flip(#[schemars(schema_with = "flip_schema")] f64),
+    /// Relative RMSE of the displayed picture in linear light over the head, above 0.
+    RelativeRmse(#[schemars(schema_with = "relative_rmse_schema")] f64),
     /// Milliseconds of a frame, above 0.
     Milliseconds(#[schemars(schema_with = "milliseconds_schema")] f64),
 }
 
 fn flip_schema(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": "number", "exclusiveMinimum": 0, "description": "Mean FLIP over the head." })
+}
+
+fn relative_rmse_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "number", "exclusiveMinimum": 0, "description": "Relative RMSE over the head." })
 }
 
 fn milliseconds_schema(_: &mut SchemaGenerator) -> Schema {
@@ -63,12 +70,15 @@ impl std::str::FromStr for Bound {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("found {text:?}, expected flip=X or ms=X with X above 0, such as flip=0.02");
+        let wrong = || {
+            format!("found {text:?}, expected flip=X, rel-rmse=X or ms=X with X above 0, such as flip=0.02")
+        };
         let (name, number) = text.split_once('=').ok_or_else(wrong)?;
         let number: f64 =
             number.trim().parse().ok().filter(|n: &f64| *n > 0.0 && n.is_finite()).ok_or_else(wrong)?;
         match name.trim() {
             "flip" => Ok(Self::Flip(number)),
+            "rel-rmse" => Ok(Self::RelativeRmse(number)),
             "ms" => Ok(Self::Milliseconds(number)),
             _ => Err(wrong()),
         }
@@ -79,6 +89,7 @@ impl std::fmt::Display for Bound {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Flip(most) => write!(f, "flip={most}"),
+            Self::RelativeRmse(most) => write!(f, "rel-rmse={most}"),
             Self::Milliseconds(most) => write!(f, "ms={most}"),
         }
     }
@@ -99,13 +110,16 @@ pub struct Auto {
 }
 
 /// What was chosen for a frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "camelCase")]
 pub struct Chosen {
     /// Index of the choice of each group of the calibration; of a held group none.
     pub choices: Vec<Option<usize>>,
     /// Estimated mean FLIP, which 95 % of frames do not exceed.
     pub flip: f64,
+    /// Estimated relative RMSE, likewise.
+    #[serde(default)]
+    pub relative_rmse: f64,
     /// Estimated milliseconds.
     pub milliseconds: f64,
     /// Whether the bound is kept by that estimate.
@@ -161,7 +175,7 @@ impl Auto {
         let wrong = |what: String, found: String, expected: &str| {
             Err(Failure::input(format!("auto.{what}: found {found}, expected {expected}")))
         };
-        let (Bound::Flip(most) | Bound::Milliseconds(most)) = self.bound;
+        let (Bound::Flip(most) | Bound::RelativeRmse(most) | Bound::Milliseconds(most)) = self.bound;
         if !(most > 0.0 && most.is_finite()) {
             return wrong("bound".into(), most.to_string(), "a number above 0");
         }
@@ -188,16 +202,28 @@ impl Auto {
     fn estimate(&self, choices: &[Option<usize>], heads: &[Features], size: [u32; 2]) -> Chosen {
         let calibration = &self.calibration;
         let base = heads.iter().map(|f| calibration.base_ms(f, size)).fold(0.0, f64::max);
-        let mut chosen = Chosen { choices: choices.to_vec(), flip: 0.0, milliseconds: base, is_kept: true };
+        let mut chosen = Chosen { choices: choices.to_vec(), milliseconds: base, ..Chosen::default() };
         for (g, choice) in choices.iter().enumerate().filter_map(|(g, c)| Some((g, (*c)?))) {
-            chosen.flip += heads.iter().map(|f| calibration.error(g, choice, f)).fold(0.0, f64::max);
+            let error =
+                |metric| heads.iter().map(|f| calibration.error(metric, g, choice, f)).fold(0.0, f64::max);
+            chosen.flip += error(Metric::Flip);
+            chosen.relative_rmse += error(Metric::RelativeRmse);
             chosen.milliseconds += heads.iter().map(|f| calibration.cost_ms(g, choice, f, size)).sum::<f64>();
         }
         chosen.is_kept = match self.bound {
             Bound::Flip(most) => chosen.flip <= most,
+            Bound::RelativeRmse(most) => chosen.relative_rmse <= most,
             Bound::Milliseconds(most) => chosen.milliseconds <= most,
         };
         chosen
+    }
+
+    /// The error that it looks at.
+    fn error(&self, chosen: &Chosen) -> f64 {
+        match self.bound {
+            Bound::RelativeRmse(_) => chosen.relative_rmse,
+            Bound::Flip(_) | Bound::Milliseconds(_) => chosen.flip,
+        }
     }
 
     /// Choices for a frame after those of the frame before, for heads with these features.
@@ -211,11 +237,12 @@ impl Auto {
             let longer =
                 front.iter().flat_map(|c| choices.iter().map(move |choice| [&c[..], &[*choice]].concat()));
             all = longer.map(|c| self.estimate(&c, heads, size)).collect();
-            all.sort_by(|a, b| a.milliseconds.total_cmp(&b.milliseconds).then(a.flip.total_cmp(&b.flip)));
+            let error = |c: &Chosen| self.error(c);
+            all.sort_by(|a, b| a.milliseconds.total_cmp(&b.milliseconds).then(error(a).total_cmp(&error(b))));
             let mut least = f64::INFINITY;
             all.retain(|c| {
-                let is_nearer = c.flip < least;
-                least = least.min(c.flip);
+                let is_nearer = error(c) < least;
+                least = least.min(error(c));
                 is_nearer
             });
             front = all.iter().map(|c| c.choices.clone()).collect();
@@ -225,17 +252,18 @@ impl Auto {
             return self.estimate(&[], heads, size);
         };
         let under = |share: f64| match self.bound {
-            Bound::Flip(most) => all.iter().find(|c| c.flip <= share * most),
+            Bound::Flip(most) | Bound::RelativeRmse(most) => {
+                all.iter().find(|c| self.error(c) <= share * most)
+            }
             Bound::Milliseconds(most) => all.iter().rfind(|c| c.milliseconds <= share * most),
         };
         let stays = before.map(|b| self.estimate(&b.choices, heads, size)).filter(|c| c.is_kept);
         let Some(stays) = stays else {
-            return under(1.0)
-                .unwrap_or(if matches!(self.bound, Bound::Flip(_)) { nearest } else { fastest })
-                .clone();
+            let none = if matches!(self.bound, Bound::Milliseconds(_)) { fastest } else { nearest };
+            return under(1.0).unwrap_or(none).clone();
         };
         let is_better = |c: &&Chosen| match self.bound {
-            Bound::Flip(_) => c.milliseconds < stays.milliseconds,
+            Bound::Flip(_) | Bound::RelativeRmse(_) => c.milliseconds < stays.milliseconds,
             Bound::Milliseconds(_) => c.flip < stays.flip,
         };
         under(HYSTERESIS).filter(is_better).cloned().unwrap_or(stays)
@@ -278,7 +306,11 @@ impl Auto {
         };
         let names: Vec<String> = self.calibration.groups.iter().zip(&chosen.choices).filter_map(of).collect();
         let kept = if chosen.is_kept { "" } else { "; no choice keeps the bound, this one comes nearest" };
-        format!("{}: FLIP {:.4}, {:.2} ms{kept}", names.join(", "), chosen.flip, chosen.milliseconds)
+        let error = match self.bound {
+            Bound::RelativeRmse(_) => format!("relative RMSE {:.4}", chosen.relative_rmse),
+            _ => format!("FLIP {:.4}", chosen.flip),
+        };
+        format!("{}: {error}, {:.2} ms{kept}", names.join(", "), chosen.milliseconds)
     }
 }
 
@@ -303,6 +335,10 @@ mod tests {
         let slow = auto(Bound::Milliseconds(100.0)).choose(&[NEAR], size, None);
         let fast = auto(Bound::Milliseconds(loose.milliseconds)).choose(&[NEAR], size, None);
         assert!(slow.flip < fast.flip, "{slow:?} {fast:?}");
+        let of = |most: f64| auto(Bound::RelativeRmse(most)).choose(&[NEAR], size, None);
+        let (loose, tight) = (of(0.5), of(0.02));
+        assert!(loose.milliseconds < tight.milliseconds && loose.relative_rmse > tight.relative_rmse);
+        assert!(loose.is_kept && loose.relative_rmse <= 0.5);
         let never = auto(Bound::Milliseconds(1e-6)).choose(&[NEAR], size, None);
         assert!(!never.is_kept);
     }
@@ -369,7 +405,7 @@ mod tests {
         let base = Settings::default();
         let settings = auto.settings(&base, &auto.choose(&[NEAR], [640, 640], None)).unwrap();
         assert_eq!(settings.quality.scatter, base.quality.scatter);
-        for text in ["flip=0.02", "ms=1.5"] {
+        for text in ["flip=0.02", "rel-rmse=0.1", "ms=1.5"] {
             assert_eq!(text.parse::<Bound>().unwrap().to_string(), text);
         }
         for wrong in ["", "flip", "flip=0", "ms=-1", "ms=nan", "psnr=3"] {

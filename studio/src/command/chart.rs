@@ -66,9 +66,9 @@ pub(crate) struct Arguments {
     /// Random shots of --calibrate [default: 64; 24 for quick]
     #[arg(long, value_name = "N", requires = "calibrate", value_parser = clap::value_parser!(u32).range(16..=4096))]
     shots: Option<u32>,
-    /// In place of a chart: how well --max-error chooses in the suite's scenes, beside every fixed setting; what flags say is not
-    /// chosen
-    #[arg(long, conflicts_with_all = ["sequence", "stability", "calibrate"])]
+    /// In place of a chart: how well --max-error chooses in the suite's scenes, or in 12 frames of each --sequence, beside every
+    /// fixed setting; what flags say is not chosen
+    #[arg(long, conflicts_with_all = ["stability", "calibrate"])]
     auto: bool,
     /// In place of a chart: light of scattering methods beside paths traced through the volume of the head (index.html, volume.json,
     /// volume.csv, stills.csv, pictures, and the right light of each still, which a later run with the same options reads again)
@@ -326,6 +326,8 @@ fn timing(rounds: u32, frames: u32) -> Timing {
     Timing { rounds, warm_up: frames.div_ceil(2), frames }
 }
 
+/// Frames of a sequence that --auto looks at.
+const FRAMES_OF_SEQUENCE: u32 = 12;
 /// Bounds under which choices are judged.
 const BOUNDS: [f64; 5] = [0.005, 0.01, 0.02, 0.04, 0.08];
 
@@ -337,11 +339,20 @@ fn judge(
     (base, held): (&Settings, Vec<String>),
     suite: Suite,
 ) -> Outcome {
-    let (scenes, notes) = chart::scenes(suite, head, rig)?;
+    let (mut scenes, mut notes) = (Vec::new(), Vec::new());
+    for path in &arguments.sequence {
+        let (frames, found) = chart::frames_of(path, head, rig, FRAMES_OF_SEQUENCE)?;
+        scenes.extend(frames);
+        notes.extend(found);
+    }
+    if scenes.is_empty() {
+        (scenes, notes) = chart::scenes(suite, head, rig)?;
+    }
     console::notes(&notes);
     let name = studio.adapter().name;
     let auto = Auto { bound: Bound::Flip(1.0), held, calibration: Calibration::of_devices([name.as_str()])? };
-    let timing = experiment::Timing { rounds: 2, frames: arguments.frames.unwrap_or(5).max(1) };
+    let timing =
+        experiment::Timing { rounds: arguments.rounds, frames: arguments.frames.unwrap_or(5).max(1) };
     studio.set_heads([head])?;
     let mut progress = Progress::default();
     let measured = experiment::measured(studio, head, base, &scenes, &auto, timing, &mut progress);
@@ -368,6 +379,10 @@ fn judge(
     );
     say!("| --- | --- | --- | --- | --- | --- | --- |");
     for r in &report.rows {
+        if r.possible == 0 {
+            say!("| {} | 0 | - | - | - | - | - |", r.bound);
+            continue;
+        }
         let fixed = r.over_fixed.map_or("-".to_owned(), |v| format!("{v:.2}"));
         say!(
             "| {} | {} | {} | {} | {:.2} | {fixed} | {:.4} |",

@@ -1,4 +1,5 @@
-//! `rubor check`: finds faults in files, entries without effect, and the reason why a wrinkle does not show.
+//! `rubor check`: finds faults in files, entries without effect, and the reason why a wrinkle does not show; with --budget what
+//! sequences do not need of a head (`budget.rs`).
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -14,6 +15,7 @@ use rubor_rig::limits;
 use rubor_rig::timeline::Sequence;
 use serde::Serialize;
 
+use super::budget;
 use rubor::inputs;
 use rubor::notes::{Note, summed};
 use rubor::{Failure, Outcome};
@@ -22,14 +24,16 @@ use rubor::{Failure, Outcome};
 pub(crate) struct Arguments {
     /// Heads (.glb, .gltf, .vrm, .obj, .ma, .usda, .usdz), rigs, sequences, retarget files (.json), recordings (.csv, .json); files that
     /// are given together is checked together
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required_unless_present = "budget", value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Fail on warnings too
     #[arg(long)]
     strict: bool,
-    /// Print the findings as JSON
+    /// Print the findings, or the budget, as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    budget: budget::Arguments,
 }
 
 /// Kind of a file.
@@ -79,6 +83,10 @@ struct Subject {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    if arguments.budget.budget {
+        return budget::run(&arguments.budget, &arguments.files, arguments.json);
+    }
+    arguments.budget.refuse_settings()?;
     let mut reports = Vec::new();
     for file in &arguments.files {
         reports.push(Report { file: file.clone(), kind: kind(file)?, findings: Vec::new() });

@@ -13,6 +13,7 @@ mod console;
 
 mod adapters;
 mod bench;
+mod budget;
 mod capture;
 mod chart;
 mod check;
@@ -62,7 +63,7 @@ enum Command {
     Import(import::Arguments),
     /// Write an animated head for other programs: .glb, .usda, .usdz
     Export(export::Arguments),
-    /// Tell what is wrong with files, what has no effect, and why a wrinkle does not show
+    /// Tell what is wrong with files, what has no effect, why a wrinkle does not show, and what sequences do not need (--budget)
     Check(check::Arguments),
     /// Make the maps of a head: hemoglobin, chromophores, normals, transfer
     Maps(maps::MapsArgs),

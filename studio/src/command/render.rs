@@ -57,9 +57,10 @@ pub(crate) struct Changes {
     /// Draw a map of the (first) head's current state into a corner
     #[arg(long, value_enum, value_name = "MAP")]
     inset: Option<inset::Map>,
-    /// Choose the cheapest settings for each frame whose visible error stays under a bound, such as flip=0.02 (mean FLIP over
-    /// the head against full quality); settings given by flags stay
-    #[arg(long, value_name = "flip=X", value_parser = parse_error)]
+    /// Choose the cheapest settings for each frame whose error against full quality stays under a bound: flip=X (mean FLIP
+    /// over the head) or rel-rmse=X (relative RMSE of linear light); settings given by flags stay [default: flip=0.01 for all but
+    /// --antialias, unless --preset or a flag of quality is given]
+    #[arg(long, value_name = "flip=X|rel-rmse=X", value_parser = parse_error)]
     max_error: Option<Bound>,
     /// Choose the most exact settings for each frame that fit into a time, in milliseconds
     #[arg(long, value_name = "MS", conflicts_with = "max_error", value_parser = parse_budget)]
@@ -140,6 +141,7 @@ impl Contents {
                 let of_head = heads.first().and_then(|h| h.rig.clone());
                 let mut job = Job::new(&heads, inputs::rig(self.rig.as_deref(), of_head)?, sequence)?;
                 job.settings = changes.settings.settings(job.sequence.size)?;
+                changes.leave_out(&mut job)?;
                 (job, heads)
             }
         };
@@ -152,10 +154,14 @@ impl Contents {
     }
 }
 
-fn parse_error(text: &str) -> Result<Bound, String> {
+/// Error of what is left out without being asked: a quarter of what `smaa-1x` has to 64 samples of a pixel (docs/speed.md).
+const UNSEEN: Bound = Bound::Flip(0.01);
+
+/// A bound of an error.
+pub(super) fn parse_error(text: &str) -> Result<Bound, String> {
     match text.parse() {
-        Ok(bound @ Bound::Flip(_)) => Ok(bound),
-        _ => Err(format!("found {text:?}, expected flip=X with X above 0, such as flip=0.02")),
+        Ok(bound @ (Bound::Flip(_) | Bound::RelativeRmse(_))) => Ok(bound),
+        _ => Err(format!("found {text:?}, expected flip=X or rel-rmse=X with X above 0, such as flip=0.02")),
     }
 }
 
@@ -165,12 +171,25 @@ fn parse_budget(text: &str) -> Result<Bound, String> {
         .map_err(|_| format!("found {text:?}, expected milliseconds above 0, such as 1.5"))
 }
 
+fn calibration() -> Outcome<Calibration> {
+    let devices = rubor::studio::adapters();
+    Calibration::of_devices(devices.iter().map(|d| d.name.as_str()))
+}
+
 impl Changes {
+    /// Where nobody says anything about quality: leaves out what frames do not show. Antialiasing stays as it is, as no
+    /// choice of it is near to full quality.
+    fn leave_out(&self, job: &mut Job) -> Outcome {
+        if self.settings.preset().is_none() && !self.settings.says_quality() {
+            let held = vec!["antialias".to_owned()];
+            job.auto = Some(Auto { bound: UNSEEN, held, calibration: calibration()? });
+        }
+        Ok(())
+    }
+
     fn apply(&self, job: &mut Job) -> Outcome {
         if let Some(bound) = self.max_error.or(self.budget_ms) {
-            let devices = rubor::studio::adapters();
-            let calibration = Calibration::of_devices(devices.iter().map(|d| d.name.as_str()))?;
-            job.auto = Some(Auto { bound, held: self.settings.given(), calibration });
+            job.auto = Some(Auto { bound, held: self.settings.given(), calibration: calibration()? });
         }
         self.settings.overlay(&mut job.settings)?;
         job.sequence.fps = self.fps.unwrap_or(job.sequence.fps);
@@ -198,6 +217,8 @@ impl Shared {
                 PREVIEW[0], PREVIEW[1]
             );
             console::notes(&[Note::new("demo", message)]);
+        } else {
+            self.changes.leave_out(&mut job)?;
         }
         self.changes.apply(&mut job)?;
         job.seal(&heads)?;

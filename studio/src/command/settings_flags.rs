@@ -148,6 +148,11 @@ impl<P: Purpose> SettingsFlags<P> {
         self.given.iter().map(|(leaf, _)| leaf.flag()).collect()
     }
 
+    /// Whether a flag of quality was given.
+    pub(crate) fn says_quality(&self) -> bool {
+        self.given.iter().any(|(leaf, _)| leaf.path[0] == "quality")
+    }
+
     /// Puts the flags that were given over settings.
     pub(crate) fn overlay(&self, settings: &mut Settings) -> Outcome {
         for (leaf, values) in &self.given {

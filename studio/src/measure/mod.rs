@@ -1,6 +1,7 @@
 //! Measuring: time of passes, error of methods, difference of pictures.
 
 pub mod bench;
+pub mod budget;
 pub mod chart;
 pub mod difference;
 pub mod stability;

@@ -128,6 +128,7 @@ pub(super) fn write(
         scattering,
         hair,
         hair_color_linear: maps.hair_color_linear,
+        hair_count: maps.hair_count,
     })
 }
 

@@ -18,6 +18,7 @@ mod geometry;
 mod maps;
 mod materials;
 mod meshopt;
+pub mod sizes;
 mod skin;
 
 use std::path::Path;

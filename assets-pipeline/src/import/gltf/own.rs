@@ -250,6 +250,7 @@ fn maps(document: &Document, entries: &MapEntries) -> Result<SkinMaps, ImportErr
         scattering: optional("scattering", &entries.scattering, 1)?,
         hair: optional("hair", &entries.hair, 1)?,
         hair_color_linear: entries.hair_color_linear,
+        hair_count: entries.hair_count,
         ..SkinMaps::default()
     };
     for d in &entries.distributions {

@@ -135,7 +135,7 @@ impl Boundary {
     fn refracting(&self, l: Vec3, w: Vec3, n: Vec3) -> Option<(Vec3, f32)> {
         let h = -(l + self.eta * w).normalize_or_zero();
         let (lh, wh) = (l.dot(h), w.dot(h));
-        (lh > 0.0 && wh < 0.0 && h.dot(n) > 0.0).then(|| (h, lh + self.eta * wh))
+        (lh > 0.0 && wh < 0.0 && h.dot(n) > 0.0).then_some((h, lh + self.eta * wh))
     }
 
     /// The same of a microfacet that faces away, where such count.

@@ -233,11 +233,11 @@ pub fn flat_reflectance(flesh: &Flesh, mu: f32, paths: u64, seed: u64) -> [[f64;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Patch {
-    /// A lamp lights it, its cosine is above [`GRAZING`].
+    /// A lamp lights it, its cosine is above 0.3.
     Lit,
-    /// Not that, but a lamp that nothing hides is within [`GRAZING`] of the horizon.
+    /// Not that, but a lamp that nothing hides is within 0.3 of the horizon.
     Terminator,
-    /// No lamp, and another surface is nearer than [`THIN_MM`] behind.
+    /// No lamp, and another surface is nearer than 8 mm behind.
     Thin,
     /// No lamp, and nothing behind.
     Shadow,

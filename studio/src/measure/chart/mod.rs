@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use rubor_renderer::settings::{ScatterMethod, Settings};
 
 pub use choices::{Effort, Group, Measure, RightLight, groups};
-pub use suite::{Scene, Suite, scene_of, scenes};
+pub use suite::{Scene, Suite, frames_of, scene_of, scenes};
 use truth::save_light;
 pub(crate) use truth::{Drawn, SETTLED_FRAMES, Truth, draw};
 
@@ -34,7 +34,7 @@ use crate::studio::Studio;
 use crate::watch::Watch;
 
 /// Frames that raise the clock of a graphics card.
-const WAKING_FRAMES: u32 = 600;
+pub(crate) const WAKING_FRAMES: u32 = 600;
 
 /// Repetitions of timing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -240,6 +240,7 @@ pub fn times(
     let error = ChartError {
         flip_mean: 0.0,
         flip_99: 0.0,
+        relative_rmse: 0.0,
         relative_rmse_to_surface: None,
         relative_rmse_to_screen: None,
     };

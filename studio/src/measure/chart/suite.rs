@@ -134,6 +134,22 @@ pub fn scene_of(path: &Path, head: &Head, rig: &Rig) -> Outcome<(Scene, Vec<Note
     Ok((Scene { name, provokes: String::new(), shot: evaluator.at(0.0) }, notes))
 }
 
+/// Frames of a sequence file at equal distances of time, from its beginning, as scenes.
+///
+/// # Errors
+/// As [`scene_of`].
+pub fn frames_of(path: &Path, head: &Head, rig: &Rig, count: u32) -> Outcome<(Vec<Scene>, Vec<Note>)> {
+    let (first, notes) = scene_of(path, head, rig)?;
+    let (sequence, _) = inputs::sequence(Some(path))?;
+    let (evaluator, _) = Evaluator::new(head, rig, &sequence)?;
+    let frame = |i: u32| {
+        let seconds = f64::from(i) * sequence.duration / f64::from(count.max(1));
+        let name = format!("{}-{seconds:.2}", first.name);
+        Scene { name, provokes: String::new(), shot: evaluator.at(seconds) }
+    };
+    Ok(((0..count).map(frame).collect(), notes))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -30,14 +30,7 @@ pub(crate) struct Drawn {
 pub(crate) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light: bool) -> Outcome<Drawn> {
     let mut settings = settings.clone();
     settings.output.channels = if light { vec![Channel::Diffuse, Channel::Albedo] } else { Vec::new() };
-    let shots = std::slice::from_ref(shot);
-    studio.cut(0);
-    if settings.quality.antialias.is_temporal() {
-        for _ in 1..SETTLED_FRAMES {
-            studio.draw(shots, 0.0, &settings)?;
-        }
-    }
-    let frame = studio.render(shots, 0.0, &settings)?;
+    let frame = settled(studio, shot, &settings)?;
     // The fourth component of the diffuse light is for the methods on the screen.
     let diffuse = match frame.channels.as_slice() {
         [diffuse, albedo] => (diffuse.texels::<4>().zip(albedo.texels::<4>()))
@@ -46,6 +39,18 @@ pub(crate) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light:
         _ => Vec::new(),
     };
     Ok(Drawn { frame, diffuse })
+}
+
+/// The frame of a still scene after which antialiasing over time changes no more.
+fn settled(studio: &mut Studio, shot: &Shot, settings: &Settings) -> Outcome<Frame> {
+    let shots = std::slice::from_ref(shot);
+    studio.cut(0);
+    if settings.quality.antialias.is_temporal() {
+        for _ in 1..SETTLED_FRAMES {
+            studio.draw(shots, 0.0, settings)?;
+        }
+    }
+    studio.render(shots, 0.0, settings)
 }
 
 /// A scene as it should be.
@@ -95,9 +100,7 @@ impl Truth {
             Measure::Picture => {
                 let mut covered = settings.clone();
                 covered.output.channels = vec![Channel::Radiance];
-                let shots = std::slice::from_ref(shot);
-                studio.cut(0);
-                let mut frame = studio.render(shots, 0.0, &covered)?;
+                let mut frame = settled(studio, shot, &covered)?;
                 let Some(radiance) = frame.channels.pop() else {
                     return Err(Failure::job("the frame has no radiance"));
                 };
@@ -115,7 +118,11 @@ impl Truth {
 
     /// How far a choice is from it, and its map of visible differences.
     pub(crate) fn error(&self, test: &Drawn) -> (ChartError, Vec<f32>) {
-        let map = flip::ldr(&pixels(&test.frame.image), &self.pixels, flip::PIXELS_PER_DEGREE);
+        let shown = pixels(&test.frame.image);
+        let map = flip::ldr(&shown, &self.pixels, flip::PIXELS_PER_DEGREE);
+        let counted_of = |p: &Pixels| -> Vec<[f32; 3]> {
+            p.linear.iter().zip(&self.counts).filter(|(_, counts)| **counts).map(|(v, _)| *v).collect()
+        };
         let counted: Vec<f32> =
             map.iter().zip(&self.counts).filter(|(_, counts)| **counts).map(|(v, _)| *v).collect();
         let (flip_mean, flip_99) = mean_and_percentile(&counted);
@@ -126,6 +133,7 @@ impl Truth {
         let error = ChartError {
             flip_mean,
             flip_99,
+            relative_rmse: relative_rmse(&counted_of(&shown), &counted_of(&self.pixels)),
             relative_rmse_to_surface: light.map(|l| l[0]),
             relative_rmse_to_screen: light.map(|l| l[1]),
         };

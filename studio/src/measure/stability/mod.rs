@@ -80,7 +80,7 @@ pub fn run(
         let rights = rights(studio, head, base, sweep, options.samples, watch)?;
         let mut all: Vec<Vec<Shown>> = choices.iter().map(|_| Vec::new()).collect();
         // Where the head changes, it is loaded once a step; else a choice runs through its steps, as a film does.
-        if sweep.steps.iter().any(|step| step.scale != 1.0) {
+        if sweep.steps.iter().any(|step| step.change.is_some()) {
             for step in &sweep.steps {
                 enter(studio, head, step)?;
                 for ((.., settings), shown) in choices.iter().zip(&mut all) {
@@ -176,11 +176,11 @@ fn rights(
     let [width, height] = base.output.size.map(|n| n as usize);
     let n = smooth.samples_per_side() as usize;
     let mut all = Vec::new();
-    if sweep.steps.iter().all(|step| step.scale == 1.0) {
+    if sweep.steps.iter().all(|step| step.change.is_none()) {
         enter_plain(studio, head)?;
     }
     for step in &sweep.steps {
-        if step.scale != 1.0 {
+        if step.change.is_some() {
             enter(studio, head, step)?;
         }
         studio.cut(0);

@@ -5,7 +5,8 @@ use rubor_assets::convert::size;
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::expression::Rig;
 use rubor_rig::framing::FaceFrame;
-use rubor_rig::head::Head;
+use rubor_rig::head::{Head, SkinMaps};
+use rubor_rig::hemoglobin::MAX_SCALE;
 use rubor_rig::timeline::Sequence;
 
 use crate::error::Outcome;
@@ -30,18 +31,57 @@ pub struct Step {
     pub value: f64,
     /// What the head shows, from where, in which light.
     pub shot: Shot,
-    /// Factor of the head's size: light goes as far as ever, so thin parts get thinner and curves narrower.
-    pub scale: f32,
+    /// What is changed of the head.
+    pub change: Option<Change>,
+}
+
+/// A change of a head.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// Factor of its size: light goes as far as ever, so thin parts get thinner and curves narrower.
+    Size(f32),
+    /// Factor of the local contrast of the neutral blood, 0 to 1; the scales of distributions make up for it up to
+    /// [`MAX_SCALE`].
+    BloodContrast(f32),
+    /// Steepest slope of the relief and of its wrinkles, degrees.
+    Relief(f32),
 }
 
 impl Step {
-    /// The head at its size, where it is another one.
+    /// The head as the step has it, where it is another one.
     pub fn head(&self, head: &Head) -> Option<Head> {
-        (self.scale != 1.0).then(|| {
-            let mut scaled = head.clone();
-            size::scale(&mut scaled, self.scale);
-            scaled
-        })
+        let mut changed = self.change.map(|_| head.clone())?;
+        match self.change? {
+            Change::Size(factor) => size::scale(&mut changed, factor),
+            Change::BloodContrast(factor) => flatten_blood(&mut changed.maps, factor),
+            Change::Relief(degrees) => steepen(&mut changed.maps, degrees),
+        }
+        Some(changed)
+    }
+}
+
+/// Brings the neutral blood nearer to its local mean and the scales of distributions up by as much.
+fn flatten_blood(maps: &mut SkinMaps, factor: f32) {
+    if let (Some(neutral), Some(mean)) = (&mut maps.hemoglobin, &maps.hemoglobin_mean) {
+        let [width, height] = [neutral.width, neutral.height];
+        for (i, value) in neutral.values.iter_mut().enumerate() {
+            let [x, y] = [i as u32 % width, i as u32 / width];
+            let [u, v] = [(x as f32 + 0.5) / width as f32, (y as f32 + 0.5) / height as f32];
+            let mean = mean.sample(u, v, 0);
+            *value = mean + factor * (*value - mean);
+        }
+    }
+    for scale in maps.distributions.iter_mut().flat_map(|d| &mut d.scale.values) {
+        *scale = (*scale / factor.max(1e-6)).min(MAX_SCALE);
+    }
+}
+
+/// Makes the steepest slope of the relief, and that of its wrinkles, an angle.
+fn steepen(maps: &mut SkinMaps, degrees: f32) {
+    for map in maps.slopes.iter_mut().chain(&mut maps.wrinkle_slopes) {
+        let steepest = map.values.chunks_exact(2).map(|s| s[0].hypot(s[1])).fold(0.0, f32::max);
+        let factor = degrees.to_radians().tan() / steepest.max(1e-6);
+        map.values.iter_mut().for_each(|v| *v *= factor);
     }
 }
 
@@ -76,7 +116,7 @@ pub fn sweeps(head: &Head, rig: &Rig, steps: usize, side: u32) -> Outcome<Vec<Sw
         Ok(Evaluator::new(head, rig, &sequence)?.0.at(0.0))
     };
     let portrait = shot("portrait", PORTRAIT)?;
-    let at = |value: f64, shot: Shot| Step { value, shot, scale: 1.0 };
+    let at = |value: f64, shot: Shot| Step { value, shot, change: None };
     let mut all = Vec::new();
 
     // Two pixels to the side, in eighths and finer.
@@ -192,13 +232,40 @@ pub fn sweeps(head: &Head, rig: &Rig, steps: usize, side: u32) -> Outcome<Vec<Sw
             light.position *= f;
             light.power_linear *= f * f;
         }
-        Step { value: factor, shot, scale: f }
+        Step { value: factor, shot, change: Some(Change::Size(f)) }
     });
     all.push(Sweep {
         name: "size",
         moves: "size of the head before a lamp behind it",
         is_geometric: true,
         steps: sizes.collect(),
+    });
+
+    // Blood without contrast, of which expressions still ask for some: the scale would be without limit.
+    let blush = shot("blush", BLUSH)?;
+    let flat = geometric(1.0, 0.001, steps).map(|factor| Step {
+        value: factor,
+        shot: blush.clone(),
+        change: Some(Change::BloodContrast(factor as f32)),
+    });
+    all.push(Sweep {
+        name: "blood-contrast",
+        moves: "contrast of the neutral blood",
+        is_geometric: true,
+        steps: flat.collect(),
+    });
+
+    let frown = shot("frown", FROWN)?;
+    let steep = linear(5.0, 89.0, steps).map(|degrees| Step {
+        value: degrees,
+        shot: frown.clone(),
+        change: Some(Change::Relief(degrees as f32)),
+    });
+    all.push(Sweep {
+        name: "relief",
+        moves: "steepest slope of relief and wrinkles, degrees",
+        is_geometric: false,
+        steps: steep.collect(),
     });
     Ok(all)
 }
@@ -217,7 +284,8 @@ mod tests {
             assert_eq!(sweep.steps.len(), 5, "{}", sweep.name);
             let rises = sweep.steps.windows(2).map(|w| w[1].value > w[0].value);
             assert!(rises.clone().all(|r| r) || rises.clone().all(|r| !r), "{}", sweep.name);
-            let differs = sweep.steps.windows(2).any(|w| w[0].shot != w[1].shot);
+            let differs =
+                sweep.steps.windows(2).any(|w| w[0].shot != w[1].shot || w[0].change != w[1].change);
             assert!(differs, "{}", sweep.name);
         }
         let size = all.iter().find(|s| s.name == "size").unwrap();
@@ -225,5 +293,31 @@ mod tests {
         let span = |head: &Head| head.bounds().map(|(low, high)| (high - low).length()).unwrap();
         assert!((span(&small) / span(&loaded.head) - 0.025).abs() < 1e-4);
         assert!(all[0].steps[0].head(&loaded.head).is_none());
+        let of = |name: &str, step: usize| {
+            all.iter().find(|s| s.name == name).unwrap().steps[step].head(&loaded.head).unwrap().maps
+        };
+        // What the scales multiply is what the neutral blood has lost, up to the limit.
+        let spread = |maps: &SkinMaps| {
+            let [neutral, mean] = [&maps.hemoglobin, &maps.hemoglobin_mean].map(|m| m.as_ref().unwrap());
+            let at = |i: u32| (i as f32 + 0.5) / 64.0;
+            let places = (0..64).flat_map(|y| (0..64).map(move |x| [at(x), at(y)]));
+            places.map(|[u, v]| (neutral.sample(u, v, 0) - mean.sample(u, v, 0)).abs()).sum::<f32>()
+        };
+        let [whole, tenth] = [0, 4].map(|step| spread(&of("blood-contrast", step)));
+        assert!(tenth < 0.005 * whole, "{tenth} of {whole}");
+        let most = of("blood-contrast", 4)
+            .distributions
+            .iter()
+            .flat_map(|d| d.scale.values.clone())
+            .fold(0.0, f32::max);
+        assert_eq!(most, MAX_SCALE);
+        let steepest = of("relief", 4)
+            .slopes
+            .unwrap()
+            .values
+            .chunks_exact(2)
+            .map(|s| s[0].hypot(s[1]))
+            .fold(0.0, f32::max);
+        assert!((steepest.atan().to_degrees() - 89.0).abs() < 0.01, "{steepest}");
     }
 }

@@ -11,9 +11,12 @@
 //! light is that of `fibre`: its root is dimmed by the hairs around it, its tip is not. It moves with its
 //! root.
 //!
-//! Where a hair is thinner than [`PIXELS_OF_HAIR`] of a pixel on the nearest part of a head, the first of the hairs, which are in random order,
+//! Where a hair is thinner than a third of a pixel on the nearest part of a head, the first of the hairs, which are in random order,
 //! stand for all ([`DetailMethod::Auto`]; Cook et al. 2007): each covers what its share of hairs would let through,
 //! so the number goes up by one hair at a time in a zoom.
+//!
+//! A head may keep fewer hairs than grow ([`SkinMaps::hair_count`](rubor_rig::head::SkinMaps::hair_count)): the first ones, which then stand
+//! for all in the same way.
 //!
 //! Does not: sort (hairs of one colour), cast shadows.
 
@@ -26,6 +29,7 @@ use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::hair::Blended;
 use crate::passes::hair::fibre::{self, Fibre};
 use crate::scene::PosedHead;
+use crate::scene::hair_roots::{WIDTH_METRES, drawn_hairs};
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
 use crate::settings::DetailMethod;
@@ -46,11 +50,6 @@ pub(crate) struct Params {
     pub(crate) share: f32,
     pub(crate) padding: [u32; 2],
 }
-
-/// Width of a hair at its root, metres.
-const WIDTH_METRES: f32 = 0.00014;
-/// Width in pixels of the hairs that are drawn, together with those that they stand for.
-const PIXELS_OF_HAIR: f32 = 0.35;
 
 /// The pipelines of the pass.
 pub(crate) struct CroppedHair {
@@ -87,10 +86,10 @@ impl CroppedHair {
         let hair_light = fibre.params(r, light);
         let numbers = |h: &&PosedHead<'_>| {
             let color = h.head.maps.as_ref().map_or([0.0; 3], |m| m.hair_color_linear);
-            let all = h.head.hair_root_count;
+            let [most, all] = h.head.hair_counts();
             let count = match detail {
-                DetailMethod::Full => all,
-                DetailMethod::Auto => drawn_hairs(all, seen.pixel_metres(h.index)),
+                DetailMethod::Full => most,
+                DetailMethod::Auto => drawn_hairs(all, seen.pixel_metres(h.index)).min(most),
             };
             Params {
                 color: Vec3::from(color).extend(1.0).to_array(),
@@ -123,10 +122,4 @@ impl CroppedHair {
             .map(|(h, params)| (vec![("hairs", h.hairs.bound())], Draw::Corners(params.count * 3)));
         self.kernels.record(r, [hdr, &seen.depth], velocity, each);
     }
-}
-
-/// How many of the hairs stand for all where a pixel has a width.
-fn drawn_hairs(all: u32, pixel_metres: f32) -> u32 {
-    let share = (WIDTH_METRES / (PIXELS_OF_HAIR * pixel_metres)).min(1.0);
-    ((share * all as f32).ceil() as u32).clamp(1, all)
 }

@@ -6,6 +6,7 @@ use rubor_rig::map::Map;
 use super::*;
 use crate::channels::Channel;
 use crate::scene::hair_roots::{self, Root};
+use crate::scene::posed_head::{HAIR_BYTES, Instance};
 use crate::settings::AntialiasMethod;
 use crate::testing::{assert_layout, assert_raster, assert_workgroups, offsets};
 use crate::tests::{WHITE_TABLE, dome, lamp, read, render, renderer, settings};
@@ -150,25 +151,36 @@ fn the_first_hairs_stand_for_all() {
     let mut head = dome();
     head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
     let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    head.maps.hair_count = Some(on_gpu.hair_root_count / 3);
+    let third = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    assert_eq!(third.hair_counts(), [on_gpu.hair_root_count / 3, on_gpu.hair_root_count]);
+    for head in [&on_gpu, &third] {
+        let instance = Instance::new(renderer.gpu(), head);
+        assert_eq!(head.bytes_in_scene(), head.memory_bytes + instance.bytes());
+    }
+    let hairs = u64::from(on_gpu.hair_root_count - third.hair_root_count);
+    assert!(on_gpu.bytes_in_scene() - third.bytes_in_scene() >= hairs * (16 + HAIR_BYTES));
     let state = FaceState::neutral(&head);
-    let heads = [HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }];
-    // A pixel is 2 mm, 14 times a hair.
-    let scene = Scene {
-        heads: &heads,
-        camera: Camera { position: 2.0 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 5.5 },
-        lights: &[lamp()],
-        environment: None,
-        environment_rotation: 0.0,
-        environment_intensity: 0.0,
-        background_linear: Vec3::ZERO,
-    };
-    let mut of = |detail| {
+    let lights = [lamp()];
+    let mut of = |head, detail| {
+        // A pixel is 2 mm, 14 times a hair.
+        let scene = Scene {
+            heads: &[HeadInstance { head, state: &state, world_from_head: Mat4::IDENTITY }],
+            camera: Camera { position: 2.0 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 5.5 },
+            lights: &lights,
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+        };
         let mut settings = settings([96; 2]);
         settings.quality.detail = detail;
         render(&mut renderer, &scene, &settings).expect("it draws");
         read(&renderer, Channel::Radiance).texels::<4>().collect::<Vec<_>>()
     };
-    let (all, some) = (of(DetailMethod::Full), of(DetailMethod::Auto));
+    let all = of(&on_gpu, DetailMethod::Full);
+    let fewer =
+        [of(&on_gpu, DetailMethod::Auto), of(&third, DetailMethod::Full), of(&third, DetailMethod::Auto)];
     assert!(drawn_hairs(on_gpu.hair_root_count, 0.002) < on_gpu.hair_root_count / 3);
     // Single hairs are a matter of chance; the eye and the filter see a few pixels at once.
     let blocks = |picture: &[[f32; 4]]| -> Vec<f64> {
@@ -177,11 +189,15 @@ fn the_first_hairs_stand_for_all() {
             |b: usize| (0..64).map(|i| at(8 * (b % 12) + i % 8, 8 * (b / 12) + i / 8)).sum::<f64>() / 64.0;
         (0..144).map(block).collect()
     };
-    let (all, some) = (blocks(&all), blocks(&some));
     let mean = |blocks: &[f64]| blocks.iter().sum::<f64>() / blocks.len() as f64;
-    let apart = all.iter().zip(&some).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / all.len() as f64;
-    assert!((mean(&some) / mean(&all) - 1.0).abs() < 0.02, "{} and {}", mean(&some), mean(&all));
-    assert!(apart.sqrt() < 0.1 * mean(&all), "{} of {}", apart.sqrt(), mean(&all));
+    let all = blocks(&all);
+    for some in fewer.iter().map(|picture| blocks(picture)) {
+        let apart = all.iter().zip(&some).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / all.len() as f64;
+        assert!((mean(&some) / mean(&all) - 1.0).abs() < 0.02, "{} and {}", mean(&some), mean(&all));
+        assert!(apart.sqrt() < 0.1 * mean(&all), "{} of {}", apart.sqrt(), mean(&all));
+    }
+    // As many hairs as the whole head shows from here: the same picture.
+    assert_eq!(fewer[0], fewer[2]);
 }
 
 #[test]
