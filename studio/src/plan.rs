@@ -15,7 +15,7 @@ use rubor_renderer::settings::Settings;
 use rubor_rig::evaluate::{Evaluator, Shot};
 use rubor_rig::head::Head;
 
-use crate::auto::{Auto, Chosen, Features, Outline};
+use crate::auto::{Auto, Chosen, Outline, features_of};
 use crate::error::{Failure, Outcome};
 use crate::inputs::LoadedHead;
 use crate::job::{FrameList, Job, MOST_FRAMES};
@@ -103,15 +103,9 @@ impl<'a> Plan<'a> {
         let outlines: Vec<Outline> = self.heads.iter().map(|h| Outline::of(&h.head)).collect();
         let size = self.job.settings.output.size;
         let end = self.frames.last().map_or(0, |last| last + 1);
-        let features = (0..end).map(|frame| {
-            let shots = self.shots(frame);
-            // Camera and lamps are those of the first.
-            let seen = |(outline, shot): (&Outline, &Shot)| {
-                let Some(first) = shots.first() else { return Features::default() };
-                outline.features(&Shot { face: shot.face.clone(), ..first.clone() }, size)
-            };
-            outlines.iter().zip(&shots).map(seen).collect()
-        });
+        let outlines: Vec<&Outline> = outlines.iter().collect();
+        let features =
+            (0..end).map(|frame| features_of(&outlines, &self.shots(frame), self.spacing_m, size));
         self.chosen = auto.run(features, size);
         self.settings_of_frames =
             self.chosen.iter().map(|c| auto.settings(&self.settings, c)).collect::<Outcome<_>>()?;

@@ -9,7 +9,7 @@ use rubor_renderer::settings::{AntialiasMethod, ScatterMethod, Settings};
 use rubor_rig::head::Head;
 use serde::Serialize;
 
-use super::{Auto, Bound, Chosen, Features, Outline};
+use super::{Auto, Bound, Chosen, Features, Outline, features_of};
 use crate::error::{Failure, Outcome};
 use crate::measure::chart::{Drawn, Measure, Scene, Truth, WAKING_FRAMES, draw};
 use crate::report::{Adapter, AutoReport, AutoRow, median};
@@ -28,8 +28,8 @@ pub struct Timing {
 /// Errors and times of every combination, for each scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
-    /// Features of each scene.
-    pub features: Vec<Features>,
+    /// Features of the heads of each scene.
+    pub features: Vec<Vec<Features>>,
     /// Index of the choice of each group of the calibration; of a held group none.
     pub combinations: Vec<Vec<Option<usize>>>,
     /// Mean FLIP by combination and scene.
@@ -38,7 +38,7 @@ pub struct Measured {
     pub ms: Vec<Vec<f64>>,
 }
 
-/// Draws and times every combination of choices in scenes of a head.
+/// Draws and times every combination of choices in scenes of a head, or of as many of them as the studio has.
 ///
 /// # Errors
 /// A device without timestamps; errors of the studio.
@@ -57,7 +57,11 @@ pub fn measured(
     }
     let outline = Outline::of(head);
     let size = base.output.size;
-    let features: Vec<Features> = scenes.iter().map(|s| outline.features(&s.shot, size)).collect();
+    let of = |scene: &Scene| {
+        let shots = scene.shots();
+        features_of(&vec![&outline; shots.len()], &shots, scene.spacing_m, size)
+    };
+    let features: Vec<_> = scenes.iter().map(of).collect();
     measure(studio, base, scenes, (auto, features), timing, watch)
 }
 
@@ -74,7 +78,7 @@ pub fn judged(
         .iter()
         .map(|bound| {
             let auto = Auto { bound: Bound::Flip(*bound), ..auto.clone() };
-            let choose = |f: &Features| auto.choose(&[*f], base.output.size, None);
+            let choose = |heads: &Vec<Features>| auto.choose(heads, base.output.size, None);
             row(*bound, measured, &measured.features.iter().map(choose).collect::<Vec<_>>())
         })
         .collect();
@@ -138,7 +142,7 @@ fn measure(
     studio: &mut Studio,
     base: &Settings,
     scenes: &[Scene],
-    (auto, features): (&Auto, Vec<Features>),
+    (auto, features): (&Auto, Vec<Vec<Features>>),
     timing: Timing,
     watch: &mut dyn Watch,
 ) -> Outcome<Measured> {
@@ -155,14 +159,14 @@ fn measure(
     right.quality.antialias = AntialiasMethod::Ssaa(8);
     let truths: Vec<Truth> = scenes
         .iter()
-        .map(|scene| Truth::draw(studio, &scene.shot, &right, Measure::Picture, base))
+        .map(|scene| Truth::draw(studio, scene, &right, Measure::Picture, base))
         .collect::<Outcome<_>>()?;
     watch.begin("combinations", all.len() as u64);
     let mut errors = Vec::new();
     for settings in &all {
         let mut shown = Vec::new();
         for scene in scenes {
-            shown.push(draw(studio, &scene.shot, settings, false)?);
+            shown.push(draw(studio, scene, settings, false)?);
         }
         errors.push(flips(&shown, &truths));
         watch.step();
@@ -171,14 +175,14 @@ fn measure(
     let mut times = vec![vec![Vec::new(); scenes.len()]; all.len()];
     // A device that has had nothing to do runs slower.
     if let (Some(scene), Some(settings)) = (scenes.first(), all.last()) {
-        studio.measure(std::slice::from_ref(&scene.shot), 0.0, settings, WAKING_FRAMES, 1)?;
+        studio.measure(&scene.shots(), scene.spacing_m, settings, WAKING_FRAMES, 1)?;
     }
     watch.begin("combinations timed", u64::from(timing.rounds) * all.len() as u64);
     for _ in 0..timing.rounds {
         for (settings, times) in all.iter().zip(&mut times) {
             for (scene, times) in scenes.iter().zip(times) {
-                let shots = std::slice::from_ref(&scene.shot);
-                let frames = studio.measure(shots, 0.0, settings, timing.frames, timing.frames)?;
+                let frames =
+                    studio.measure(&scene.shots(), scene.spacing_m, settings, timing.frames, timing.frames)?;
                 times.extend(frames.iter().map(|f| f.frame_ms));
             }
             watch.step();

@@ -1,7 +1,10 @@
 //! What can be known of a frame without drawing it.
 
+use std::f64::consts::PI;
+
 use glam::Vec3;
-use rubor_rig::evaluate::Shot;
+use rubor_rig::deform::point_normals;
+use rubor_rig::evaluate::{LightState, Shot};
 use rubor_rig::head::Head;
 use serde::{Deserialize, Serialize};
 
@@ -9,6 +12,14 @@ use serde::{Deserialize, Serialize};
 const MOST_POINTS: usize = 3000;
 /// Share of a head's points in view that are nearer than the distance that counts.
 const NEAR_SHARE: usize = 10;
+/// Points of those in view on which light is estimated.
+const MOST_LIT: usize = 400;
+/// Slope by which relief tilts the surface: about that of pores.
+const RELIEF_SLOPE: f32 = 0.2;
+/// Skin, for estimates of light: albedo, reflectance head-on, root mean square slope of its facets (Beckmann).
+const SKIN: Look = Look { albedo: 0.35, head_on: 0.028, roughness: 0.3 };
+/// Linear light that a picture shows as white.
+const WHITE: f64 = 0.55;
 
 /// Numbers of a shot of a head from which errors and costs are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,20 +37,79 @@ pub struct Features {
     pub wrinkles: f64,
     /// How far blood is from neutral: weights of distributions and the change of the global factor.
     pub blood: f64,
+    /// Mean displayed value of the skin in view, 0 to 1.
+    pub brightness: f64,
+    /// How much displayed values change when the surface tilts by the slope of pores, root mean square: highlights and grazing
+    /// light make relief visible, and what is finer than a pixel alias.
+    pub relief: f64,
+}
+
+/// A place of the surface of a head.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    point: Vec3,
+    normal: Vec3,
+    /// Square metres of the surface that it stands for.
+    area: f64,
 }
 
 /// A head as features see it.
 #[derive(Clone, Debug)]
 pub struct Outline {
-    points: Vec<Vec3>,
+    places: Vec<Place>,
+}
+
+/// Skin, without maps.
+struct Look {
+    albedo: f64,
+    head_on: f64,
+    roughness: f64,
+}
+
+/// Light that reaches a place.
+struct Arriving {
+    to_light: Vec3,
+    irradiance: f64,
+}
+
+impl Look {
+    /// Displayed value of a surface with a normal.
+    fn displayed(&self, normal: Vec3, to_camera: Vec3, lamps: &[Arriving], around: f64) -> f64 {
+        let mut light = (self.albedo + self.head_on) * around;
+        for lamp in lamps {
+            let cos = f64::from(normal.dot(lamp.to_light));
+            if cos <= 0.0 {
+                continue;
+            }
+            let half = lamp.to_light + to_camera;
+            let cos_half = f64::from(normal.dot(half.normalize_or_zero())).max(1e-3);
+            let tan_square = (1.0 - cos_half * cos_half).max(0.0) / (cos_half * cos_half);
+            let m_square = self.roughness * self.roughness;
+            let facets = (-tan_square / m_square).exp() / (PI * m_square * cos_half.powi(4));
+            let toward = f64::from(half.normalize_or_zero().dot(to_camera)).clamp(0.0, 1.0);
+            let fresnel = self.head_on + (1.0 - self.head_on) * (1.0 - toward).powi(5);
+            let specular = facets * fresnel / f64::from(half.length_squared()).max(0.1);
+            light += lamp.irradiance * cos * (self.albedo / PI + specular);
+        }
+        (light / WHITE).clamp(0.0, 1.0).powf(1.0 / 2.2)
+    }
 }
 
 impl Outline {
-    /// Some points of the neutral head.
+    /// Some places of the neutral head.
     pub fn of(head: &Head) -> Self {
-        let all = &head.mesh.points;
-        let stride = all.len().div_ceil(MOST_POINTS).max(1);
-        Self { points: all.iter().step_by(stride).copied().collect() }
+        let mesh = &head.mesh;
+        let normals = point_normals(mesh, &mesh.points);
+        let mut areas = vec![0.0; mesh.points.len()];
+        for triangle in &mesh.triangles {
+            let points = triangle.map(|v| mesh.vertices[v as usize].point as usize);
+            let [a, b, c] = points.map(|p| mesh.points[p]);
+            let area = f64::from((b - a).cross(c - a).length()) / 2.0;
+            points.iter().for_each(|p| areas[*p] += area / 3.0);
+        }
+        let stride = mesh.points.len().div_ceil(MOST_POINTS).max(1);
+        let place = |i: usize| Place { point: mesh.points[i], normal: normals[i], area: areas[i] };
+        Self { places: (0..mesh.points.len()).step_by(stride).map(place).collect() }
     }
 
     /// Features of a shot of the head, in a picture of a size in pixels. A head out of view has a share of 0.
@@ -54,9 +124,11 @@ impl Outline {
         let face = &shot.face;
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         let mut depths = Vec::new();
+        let mut seen = Vec::new();
         let mut middle = Vec3::ZERO;
-        for point in &self.points {
-            let world = face.head_rotation * *point + face.head_translation;
+        for place in &self.places {
+            let world = face.head_rotation * place.point + face.head_translation;
+            let surface = (world, face.head_rotation * place.normal, place.area);
             let from_camera = world - camera.position;
             let depth = f64::from(from_camera.dot(forward));
             if depth <= 1e-4 {
@@ -73,6 +145,7 @@ impl Outline {
             if place.iter().all(|p| p.abs() <= 1.0) {
                 depths.push(depth);
                 middle += world;
+                seen.push(surface);
             }
         }
         depths.sort_by(f64::total_cmp);
@@ -81,18 +154,16 @@ impl Outline {
         let to_camera = (camera.position - middle).normalize_or_zero();
         let (mut behind, mut lamps) = (0.0, 0.0);
         for light in &shot.lights {
-            let (to_light, falloff) = if light.position == Vec3::ZERO {
-                (-light.direction, 1.0)
-            } else {
-                let away = light.position - middle;
-                (away.normalize_or_zero(), 1.0 / away.length_squared().max(1e-4))
-            };
+            let (to_light, falloff) = toward(light, middle);
             let power = f64::from(light.power_linear.element_sum() * falloff / 3.0);
             lamps += power;
             behind += power * f64::from(-to_light.dot(to_camera)).max(0.0);
         }
         let around = shot.environment.as_ref().map_or(0.0, |e| f64::from(e.intensity));
+        let [brightness, relief] = shown(&seen, shot, around);
         Features {
+            brightness,
+            relief,
             mm_per_pixel: 2000.0 * near * half_height / height,
             share: (high[0] - low[0]) * (high[1] - low[1]) / 4.0,
             backlight: if lamps > 0.0 { behind / lamps } else { 0.0 },
@@ -102,6 +173,55 @@ impl Outline {
                 + f64::from((face.hemoglobin_scale - 1.0).abs()),
         }
     }
+}
+
+/// Features of heads that stand side by side; camera and lamps are those of the first shot.
+pub fn features_of(outlines: &[&Outline], shots: &[Shot], spacing_m: f32, size: [u32; 2]) -> Vec<Features> {
+    let Some(first) = shots.first() else { return Vec::new() };
+    let middle = (shots.len() as f32 - 1.0) / 2.0;
+    let of = |(i, (outline, shot)): (usize, (&&Outline, &Shot))| {
+        let mut face = shot.face.clone();
+        face.head_translation.x += (i as f32 - middle) * spacing_m;
+        outline.features(&Shot { face, ..first.clone() }, size)
+    };
+    outlines.iter().zip(shots).enumerate().map(of).collect()
+}
+
+/// Mean displayed value of places (point, normal, area) that face the camera, and how much it changes with the slope of relief.
+fn shown(places: &[(Vec3, Vec3, f64)], shot: &Shot, around: f64) -> [f64; 2] {
+    let stride = places.len().div_ceil(MOST_LIT).max(1);
+    let (mut weights, mut values, mut squares) = (0.0, 0.0, 0.0);
+    for &(point, normal, area) in places.iter().step_by(stride) {
+        let away = shot.camera.position - point;
+        let to_camera = away.normalize_or_zero();
+        let weight = area * f64::from(normal.dot(to_camera)).max(0.0) / f64::from(away.length_squared()).max(1e-6);
+        if weight <= 0.0 {
+            continue;
+        }
+        let lamp = |light: &LightState| {
+            let (to_light, falloff) = toward(light, point);
+            Arriving { to_light, irradiance: f64::from(light.power_linear.element_sum() * falloff / 3.0) }
+        };
+        let lamps: Vec<Arriving> = shot.lights.iter().map(lamp).collect();
+        let displayed = |normal: Vec3| SKIN.displayed(normal, to_camera, &lamps, around);
+        let value = displayed(normal);
+        let (along, across) = normal.any_orthonormal_pair();
+        let tilts = [along, -along, across, -across];
+        let changes = tilts.map(|t| (displayed((normal + RELIEF_SLOPE * t).normalize()) - value).powi(2));
+        weights += weight;
+        values += weight * value;
+        squares += weight * changes.iter().sum::<f64>() / 4.0;
+    }
+    if weights > 0.0 { [values / weights, (squares / weights).sqrt()] } else { [0.0; 2] }
+}
+
+/// Direction from a point to a lamp, and what is left of its power there.
+fn toward(light: &LightState, point: Vec3) -> (Vec3, f32) {
+    if light.position == Vec3::ZERO {
+        return (-light.direction, 1.0);
+    }
+    let away = light.position - point;
+    (away.normalize_or_zero(), 1.0 / away.length_squared().max(1e-4))
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@
 //! errors of groups add up. Choices follow from the sequence alone, frame by frame from the first: any part of a job, on any machine, draws the
 //! frames of the whole. The estimates are those of one device ([`Calibration`]); the job holds them.
 //!
-//! A frame has one choice for all of its heads: that of the head with the largest error.
+//! A frame has one choice for all of its heads; its error is the mean over the pixels of all of them.
 
 pub mod calibration;
 pub mod experiment;
@@ -26,8 +26,8 @@ use serde::{Deserialize, Serialize};
 
 pub use calibration::Calibration;
 use calibration::Metric;
-pub use features::{Features, Outline};
-pub use shots::CALIBRATED;
+pub use features::{Features, Outline, features_of};
+pub use shots::{CALIBRATED, unseen_shots};
 
 use crate::error::{Failure, Outcome};
 use crate::measure::file_name;
@@ -201,14 +201,19 @@ impl Auto {
     /// Error and time of some choices, for heads with these features.
     fn estimate(&self, choices: &[Option<usize>], heads: &[Features], size: [u32; 2]) -> Chosen {
         let calibration = &self.calibration;
-        let base = heads.iter().map(|f| calibration.base_ms(f, size)).fold(0.0, f64::max);
-        let mut chosen = Chosen { choices: choices.to_vec(), milliseconds: base, ..Chosen::default() };
+        // Errors are means over the pixels of all heads; what a pass costs before its first pixel is paid once.
+        let share: f64 = heads.iter().map(|f| f.share).sum();
+        let all = Features { share, ..Features::default() };
+        let milliseconds = calibration.base_ms(&all, size);
+        let mut chosen = Chosen { choices: choices.to_vec(), milliseconds, ..Chosen::default() };
         for (g, choice) in choices.iter().enumerate().filter_map(|(g, c)| Some((g, (*c)?))) {
-            let error =
-                |metric| heads.iter().map(|f| calibration.error(metric, g, choice, f)).fold(0.0, f64::max);
+            let error = |metric| {
+                let of = |f: &Features| f.share * calibration.error(metric, g, choice, f);
+                heads.iter().map(of).sum::<f64>() / share.max(1e-9)
+            };
             chosen.flip += error(Metric::Flip);
             chosen.relative_rmse += error(Metric::RelativeRmse);
-            chosen.milliseconds += heads.iter().map(|f| calibration.cost_ms(g, choice, f, size)).sum::<f64>();
+            chosen.milliseconds += calibration.cost_ms(g, choice, &all, size);
         }
         chosen.is_kept = match self.bound {
             Bound::Flip(most) => chosen.flip <= most,
@@ -322,8 +327,16 @@ mod tests {
         Auto { bound, held: Vec::new(), calibration: Calibration::shipped().unwrap() }
     }
 
-    const NEAR: Features =
-        Features { mm_per_pixel: 0.25, share: 0.6, backlight: 0.1, contrast: 0.8, wrinkles: 0.0, blood: 0.0 };
+    const NEAR: Features = Features {
+        mm_per_pixel: 0.25,
+        share: 0.6,
+        backlight: 0.1,
+        contrast: 0.8,
+        wrinkles: 0.0,
+        blood: 0.0,
+        brightness: 0.4,
+        relief: 0.05,
+    };
 
     #[test]
     fn a_smaller_bound_costs_more_and_errs_less() {

@@ -25,6 +25,9 @@ pub const CALIBRATED: &[(&str, &[&str])] = &[
     ("shadow-size", &["512", "1024", "2048"]),
 ];
 
+/// Seed of shots that estimates are judged in.
+const UNSEEN_SEED: u64 = 0x5eed;
+
 /// [`CALIBRATED`] as a chart takes lists.
 ///
 /// # Errors
@@ -38,6 +41,14 @@ pub(super) fn calibrated() -> Outcome<Vec<(String, Vec<Value>)>> {
         Ok(((*flag).to_owned(), texts.iter().map(|text| value(flag, text)).collect::<Outcome<_>>()?))
     };
     CALIBRATED.iter().map(of).collect()
+}
+
+/// Random shots that no estimates were fitted to: those of another seed.
+///
+/// # Errors
+/// A rig that does not fit the head.
+pub fn unseen_shots(head: &Head, rig: &Rig, count: usize) -> Outcome<Vec<Scene>> {
+    random_shots(head, rig, count, UNSEEN_SEED)
 }
 
 /// Shots from a seed: a face at any distance, from the front and the sides, under one to three lamps anywhere, with any
@@ -85,7 +96,7 @@ pub(super) fn random_shots(head: &Head, rig: &Rig, count: usize, seed: u64) -> O
             light.position = origin + direction * (0.7 + 0.6 * random.uniform() as f32);
             light.direction = -direction;
         }
-        scenes.push(Scene { name, provokes: String::new(), shot });
+        scenes.push(Scene::of(name, shot));
     }
     Ok(scenes)
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use rubor::auto::measured::{self, Measured};
-use rubor::auto::{Auto, Bound, Calibration, experiment};
+use rubor::auto::{Auto, Bound, Calibration, experiment, unseen_shots};
 use rubor::measure::chart::{self, Effort, Measure, Options, RightLight, Suite, Timing, page, plot::number};
 use rubor::measure::stability;
 use rubor::measure::volume::{self, MediumName};
@@ -63,13 +63,18 @@ pub(crate) struct Arguments {
     /// keep the estimates
     #[arg(long, conflicts_with_all = ["sequence", "stability"])]
     calibrate: bool,
-    /// Random shots of --calibrate [default: 64; 24 for quick]
-    #[arg(long, value_name = "N", requires = "calibrate", value_parser = clap::value_parser!(u32).range(16..=4096))]
+    /// Random shots: of --calibrate [default: 64; 24 for quick], or of --auto in place of the suite, others than those
+    #[arg(long, value_name = "N", conflicts_with_all = ["stability", "volume", "sequence"],
+        value_parser = clap::value_parser!(u32).range(16..=4096))]
     shots: Option<u32>,
-    /// In place of a chart: how well --max-error chooses in the suite's scenes, or in 12 frames of each --sequence, beside every
-    /// fixed setting; what flags say is not chosen
+    /// In place of a chart: how well --max-error chooses in the suite's scenes, in random shots (--shots), or in 12 frames of each
+    /// --sequence, beside every fixed setting; what flags say is not chosen
     #[arg(long, conflicts_with_all = ["stability", "calibrate"])]
     auto: bool,
+    /// Heads side by side in the sequences of --auto, each further in the sequence than its neighbour
+    #[arg(long, value_name = "N", requires_all = ["auto", "sequence"], default_value_t = 1,
+        value_parser = clap::value_parser!(u8).range(1..=64))]
+    heads: u8,
     /// In place of a chart: light of scattering methods beside paths traced through the volume of the head (index.html, volume.json,
     /// volume.csv, stills.csv, pictures, and the right light of each still, which a later run with the same options reads again)
     #[arg(long, conflicts_with_all = ["stability", "calibrate", "auto", "from"])]
@@ -109,6 +114,9 @@ const EXPORTED_PATHS: u32 = 1024;
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     if let (Some(path), Some(folder)) = (&arguments.from, &arguments.output) {
         return draw_again(path, folder);
+    }
+    if arguments.shots.is_some() && !arguments.calibrate && !arguments.auto {
+        return Err(Failure::input("--shots: found it alone, expected it with --calibrate or --auto"));
     }
     let Choices { mut base, listed, held } = arguments.settings.choices()?;
     let has_size = held.iter().chain(listed.iter().map(|(flag, _)| flag)).any(|flag| flag == "size");
@@ -341,9 +349,13 @@ fn judge(
 ) -> Outcome {
     let (mut scenes, mut notes) = (Vec::new(), Vec::new());
     for path in &arguments.sequence {
-        let (frames, found) = chart::frames_of(path, head, rig, FRAMES_OF_SEQUENCE)?;
+        let heads = usize::from(arguments.heads);
+        let (frames, found) = chart::frames_of(path, head, rig, FRAMES_OF_SEQUENCE, heads)?;
         scenes.extend(frames);
         notes.extend(found);
+    }
+    if let Some(count) = arguments.shots {
+        scenes = unseen_shots(head, rig, count as usize)?;
     }
     if scenes.is_empty() {
         (scenes, notes) = chart::scenes(suite, head, rig)?;
@@ -353,7 +365,7 @@ fn judge(
     let auto = Auto { bound: Bound::Flip(1.0), held, calibration: Calibration::of_devices([name.as_str()])? };
     let timing =
         experiment::Timing { rounds: arguments.rounds, frames: arguments.frames.unwrap_or(5).max(1) };
-    studio.set_heads([head])?;
+    studio.set_heads(std::iter::repeat_n(head, usize::from(arguments.heads)))?;
     let mut progress = Progress::default();
     let measured = experiment::measured(studio, head, base, &scenes, &auto, timing, &mut progress);
     progress.end();

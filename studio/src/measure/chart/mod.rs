@@ -86,7 +86,7 @@ pub fn run(
     for drawing in &drawings {
         let light = drawing.places.iter().any(|[g, _]| groups[*g].measure == Measure::Light);
         for (s, scene) in scenes.iter().enumerate() {
-            let drawn = draw(studio, &scene.shot, drawing.settings, light)?;
+            let drawn = draw(studio, scene, drawing.settings, light)?;
             for &[g, c] in &drawing.places {
                 let group = &groups[g];
                 let Some(truth) = truths.get(&(s, key(group))) else { continue };
@@ -193,7 +193,7 @@ fn draw_truths(
         for (s, (scene, folder)) in scenes.iter().zip(folders).enumerate() {
             let known = (s, key(group));
             if !truths.contains_key(&known) {
-                let truth = Truth::draw(studio, &scene.shot, &group.truth, group.measure, base)?;
+                let truth = Truth::draw(studio, scene, &group.truth, group.measure, base)?;
                 truths.insert(known.clone(), truth);
             }
             if let (Some(folder), Some(truth)) = (folder, truths.get(&known)) {
@@ -269,14 +269,19 @@ fn time(
     let mut all = vec![vec![Vec::new(); scenes.len()]; timed.len()];
     // An idle device has a low clock.
     if let (Some(drawing), Some(scene), false) = (timed.first(), scenes.first(), studio.is_software()) {
-        studio.measure(std::slice::from_ref(&scene.shot), 0.0, drawing.settings, WAKING_FRAMES, 1)?;
+        studio.measure(&scene.shots(), scene.spacing_m, drawing.settings, WAKING_FRAMES, 1)?;
     }
     watch.begin("settings timed", u64::from(timing.rounds) * timed.len() as u64);
     for _ in 0..timing.rounds {
         for (drawing, times) in timed.iter().zip(&mut all) {
             for (scene, times) in scenes.iter().zip(times) {
-                let shots = std::slice::from_ref(&scene.shot);
-                let frames = studio.measure(shots, 0.0, drawing.settings, timing.warm_up, timing.frames)?;
+                let frames = studio.measure(
+                    &scene.shots(),
+                    scene.spacing_m,
+                    drawing.settings,
+                    timing.warm_up,
+                    timing.frames,
+                )?;
                 times.extend(frames.iter().map(|frame| frame.frame_ms));
             }
             watch.step();

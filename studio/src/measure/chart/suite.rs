@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Outcome;
 use crate::inputs;
 use crate::notes::Note;
+use crate::plan;
 
 /// How much of the suite is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -23,7 +24,7 @@ pub enum Suite {
     Whole,
 }
 
-/// A scene of one head.
+/// A scene of a head, or of several that stand side by side.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Name, also of its folder of pictures.
@@ -32,6 +33,22 @@ pub struct Scene {
     pub provokes: String,
     /// What the head shows, from where, in which light.
     pub shot: Shot,
+    /// What further heads beside it show.
+    pub beside: Vec<Shot>,
+    /// Metres between the middles of heads.
+    pub spacing_m: f32,
+}
+
+impl Scene {
+    /// A scene of one head that provokes nothing.
+    pub fn of(name: impl Into<String>, shot: Shot) -> Self {
+        Self { name: name.into(), provokes: String::new(), shot, beside: Vec::new(), spacing_m: 0.0 }
+    }
+
+    /// What each head shows; camera and lamps are those of the first.
+    pub fn shots(&self) -> Vec<Shot> {
+        std::iter::once(&self.shot).chain(&self.beside).cloned().collect()
+    }
 }
 
 /// A scene that provokes a failure: name, failure, text.
@@ -117,7 +134,7 @@ pub fn scenes(suite: Suite, head: &Head, rig: &Rig) -> Outcome<(Vec<Scene>, Vec<
         let sequence = Sequence::from_json(&name, &text)?;
         let (evaluator, found) = Evaluator::new(head, rig, &sequence)?;
         notes.extend(found.iter().map(|note| Note::of_rig(&name, note)));
-        scenes.push(Scene { name, provokes: why.to_owned(), shot: evaluator.at(0.0) });
+        scenes.push(Scene { provokes: why.to_owned(), ..Scene::of(name, evaluator.at(0.0)) });
     }
     Ok((scenes, notes))
 }
@@ -131,21 +148,34 @@ pub fn scene_of(path: &Path, head: &Head, rig: &Rig) -> Outcome<(Scene, Vec<Note
     let name = path.file_stem().map_or_else(|| "sequence".into(), |stem| stem.to_string_lossy().into_owned());
     let (evaluator, found) = Evaluator::new(head, rig, &sequence)?;
     notes.extend(found.iter().map(|note| Note::of_rig(&name, note)));
-    Ok((Scene { name, provokes: String::new(), shot: evaluator.at(0.0) }, notes))
+    Ok((Scene::of(name, evaluator.at(0.0)), notes))
 }
 
-/// Frames of a sequence file at equal distances of time, from its beginning, as scenes.
+/// Frames of a sequence file at equal distances of time, from its beginning, as scenes. Of several heads side by side each is
+/// further in the sequence than its neighbour, by an equal share of it, and the camera steps back until it sees all.
 ///
 /// # Errors
 /// As [`scene_of`].
-pub fn frames_of(path: &Path, head: &Head, rig: &Rig, count: u32) -> Outcome<(Vec<Scene>, Vec<Note>)> {
+pub fn frames_of(
+    path: &Path,
+    head: &Head,
+    rig: &Rig,
+    count: u32,
+    heads: usize,
+) -> Outcome<(Vec<Scene>, Vec<Note>)> {
     let (first, notes) = scene_of(path, head, rig)?;
     let (sequence, _) = inputs::sequence(Some(path))?;
     let (evaluator, _) = Evaluator::new(head, rig, &sequence)?;
     let frame = |i: u32| {
         let seconds = f64::from(i) * sequence.duration / f64::from(count.max(1));
         let name = format!("{}-{seconds:.2}", first.name);
-        Scene { name, provokes: String::new(), shot: evaluator.at(seconds) }
+        let later = |head: usize| {
+            evaluator.at((seconds + head as f64 * sequence.duration / heads as f64) % sequence.duration.max(1e-9))
+        };
+        let mut shots: Vec<Shot> = (0..heads.max(1)).map(later).collect();
+        plan::step_back(&mut shots);
+        let shot = shots.remove(0);
+        Scene { beside: shots, spacing_m: plan::spacing_m([head]), ..Scene::of(name, shot) }
     };
     Ok(((0..count).map(frame).collect(), notes))
 }

@@ -7,10 +7,10 @@ use rubor_assets::image_io::SampleKind;
 use rubor_renderer::BARE_SKIN;
 use rubor_renderer::channels::Channel;
 use rubor_renderer::settings::{ScatterMethod, Settings};
-use rubor_rig::evaluate::Shot;
 use rubor_rig::map::Map;
 
 use super::choices::Measure;
+use super::suite::Scene;
 use crate::error::{Failure, Outcome};
 use crate::measure::difference::{picture, pixels};
 use crate::output;
@@ -27,10 +27,10 @@ pub(crate) struct Drawn {
 }
 
 /// Draws a scene with settings; with `light` its diffuse light too.
-pub(crate) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light: bool) -> Outcome<Drawn> {
+pub(crate) fn draw(studio: &mut Studio, scene: &Scene, settings: &Settings, light: bool) -> Outcome<Drawn> {
     let mut settings = settings.clone();
     settings.output.channels = if light { vec![Channel::Diffuse, Channel::Albedo] } else { Vec::new() };
-    let frame = settled(studio, shot, &settings)?;
+    let frame = settled(studio, scene, &settings)?;
     // The fourth component of the diffuse light is for the methods on the screen.
     let diffuse = match frame.channels.as_slice() {
         [diffuse, albedo] => (diffuse.texels::<4>().zip(albedo.texels::<4>()))
@@ -42,15 +42,15 @@ pub(crate) fn draw(studio: &mut Studio, shot: &Shot, settings: &Settings, light:
 }
 
 /// The frame of a still scene after which antialiasing over time changes no more.
-fn settled(studio: &mut Studio, shot: &Shot, settings: &Settings) -> Outcome<Frame> {
-    let shots = std::slice::from_ref(shot);
+fn settled(studio: &mut Studio, scene: &Scene, settings: &Settings) -> Outcome<Frame> {
+    let shots = scene.shots();
     studio.cut(0);
     if settings.quality.antialias.is_temporal() {
         for _ in 1..SETTLED_FRAMES {
-            studio.draw(shots, 0.0, settings)?;
+            studio.draw(&shots, scene.spacing_m, settings)?;
         }
     }
-    studio.render(shots, 0.0, settings)
+    studio.render(&shots, scene.spacing_m, settings)
 }
 
 /// A scene as it should be.
@@ -76,19 +76,19 @@ impl Truth {
     /// Draws the truth of a group in a scene.
     pub(crate) fn draw(
         studio: &mut Studio,
-        shot: &Shot,
+        scene: &Scene,
         settings: &Settings,
         measure: Measure,
         base: &Settings,
     ) -> Outcome<Self> {
         match measure {
             Measure::Light => {
-                let Drawn { frame, diffuse } = draw(studio, shot, settings, true)?;
+                let Drawn { frame, diffuse } = draw(studio, scene, settings, true)?;
                 let is_skin: Vec<bool> = diffuse.iter().map(|p| p[3] >= BARE_SKIN).collect();
                 let counts = samples(&is_skin, settings).into_iter().map(|(all, _)| all).collect();
                 let mut screen = base.clone();
                 screen.quality.scatter = ScatterMethod::ReferenceScreen;
-                let on_screen = draw(studio, shot, &screen, true)?.diffuse;
+                let on_screen = draw(studio, scene, &screen, true)?.diffuse;
                 let skin = Skin {
                     light: of_skin(&diffuse, &is_skin),
                     screen: of_skin(&on_screen, &is_skin),
@@ -100,7 +100,7 @@ impl Truth {
             Measure::Picture => {
                 let mut covered = settings.clone();
                 covered.output.channels = vec![Channel::Radiance];
-                let mut frame = settled(studio, shot, &covered)?;
+                let mut frame = settled(studio, scene, &covered)?;
                 let Some(radiance) = frame.channels.pop() else {
                     return Err(Failure::job("the frame has no radiance"));
                 };
