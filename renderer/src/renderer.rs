@@ -509,6 +509,7 @@ impl Renderer {
             + self.instances.iter().map(Instance::bytes).sum::<u64>()
             + self.passes.visibility.bytes()
             + self.passes.shadow.bytes()
+            + self.passes.cropped_hair.bytes()
             + self.diffusion.method.as_ref().map_or(0, |m| m.memory_bytes())
             + self.passes.antialias.as_ref().map_or(0, Antialias::memory_bytes)
             + self.past.history.as_ref().map_or(0, History::memory_bytes)

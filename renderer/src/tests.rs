@@ -42,7 +42,9 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     }
     assert_workgroups(&see_through::behind_program(), &square("behind"));
     assert_raster(&see_through::layer_program(), &["layer_vertex", "layer_fragment"]);
-    assert_workgroups(&compose::program(), &square("compose"));
+    for hair in [false, true] {
+        assert_workgroups(&compose::program(hair), &square("compose"));
+    }
     for tone_map in ToneMap::all() {
         assert_workgroups(&display::program(tone_map), &square("display"));
         assert_workgroups(&resolve::program(tone_map), &square("resolve_samples"));

@@ -132,6 +132,9 @@ impl Passes {
         // One more than the scene has: a dark lamp may be added for transmittance.
         let lights = (scene.lights.len() + 1).min(MAX_LIGHTS);
         self.shadow.prepare(gpu, lights, settings.quality.shadow_size, scene.heads.len(), has_holes);
+        let [width, height] = settings.frame_size().map(u64::from);
+        let has_hairs = scene.heads.iter().any(|h| h.head.hair_root_count > 0);
+        self.cropped_hair.prepare(gpu, width * height, has_hairs);
         let wanted = settings.antialias();
         let size = settings.output.size;
         if wanted.mode == antialias::Mode::None {

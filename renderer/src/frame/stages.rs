@@ -115,20 +115,13 @@ impl<'a> Frame<'a> {
     ) {
         let passes = self.passes;
         let inputs = [diffuse, &lit.albedo, &lit.direct, &seen.depth];
-        let hdr = passes.compose.record(r, self.scene.background_linear, inputs);
         let is_first = samples.seen.is_empty();
         let moves = is_first && self.remembers();
+        let (hair, detail) = ((&passes.fibre, light), self.settings.quality.detail);
+        let sums = passes.cropped_hair.cover(r, hair, detail, &seen, &self.heads, moves);
+        let hdr = passes.compose.record(r, self.scene.background_linear, inputs, sums);
         let velocity = moves.then(|| passes.velocity.record(r, &seen, &self.heads));
-        let hair = (&passes.fibre, light);
-        passes.cropped_hair.record(
-            r,
-            hair,
-            self.settings.quality.detail,
-            &seen,
-            &self.heads,
-            &hdr,
-            velocity.as_ref(),
-        );
+        passes.cropped_hair.record(r, hair, detail, &seen, &self.heads, &hdr, velocity.as_ref());
         let ambient = average_light(self.scene);
         passes.overlay.record(r, hair, ambient, &seen, &self.heads, &hdr, velocity.as_ref());
         let lighting = Lighting {

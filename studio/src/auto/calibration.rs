@@ -1,9 +1,12 @@
 //! Estimates of error and cost, fitted to a chart of random shots.
 //!
 //! The error of a choice, as mean FLIP and as relative RMSE, is `d exp(c . f)`: `f` are the logarithm of the millimetres of a pixel, its square, the
-//! logarithm of the share of the picture, backlight and contrast; `d` is the weight that drives it (wrinkles, blood), or 1.
-//! Least squares with a small ridge; a margin on top covers 95 % of the shots, each predicted without itself. The cost over
-//! that of the cheapest choice is linear in the pixels of the head.
+//! logarithms of the share of the picture, of visible relief and of brightness, backlight and contrast; `d` is the weight that drives it
+//! (wrinkles, blood), or 1. Least squares with a small ridge; a margin on top covers 95 % of the shots, each predicted without itself.
+//!
+//! Errors of several choices together, [`Together`]: a share of the sum of their means, and a factor on the root of the sum of squares of their margins, as
+//! for independent errors, that covers 95 % of random combinations of choices. The cost over that of the cheapest choice is linear in the
+//! pixels of the head.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +25,9 @@ const RIDGE: f64 = 1e-3;
 /// Share of shots that the margin covers.
 const COVERED: f64 = 0.95;
 /// Terms of the model.
-const TERMS: usize = 6;
+const TERMS: usize = 8;
+/// Fewest shots that an estimate rests on.
+const FEWEST_SHOTS: usize = 12;
 
 /// What an error is proportional to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -68,7 +73,7 @@ struct Estimate {
 impl Estimate {
     /// Fits errors over their drive, and covers 95 % of them; none if there are too few.
     fn of(rows: &[([f64; TERMS], f64)]) -> Option<Self> {
-        if rows.len() < 2 * TERMS {
+        if rows.len() < FEWEST_SHOTS {
             return None;
         }
         let coefficients = fit(rows)?;
@@ -108,6 +113,64 @@ pub struct Group {
     pub choices: Vec<Choice>,
 }
 
+/// What an error is expected to be, and how much more 95 % of shots do not exceed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Expected {
+    /// The estimate.
+    pub mean: f64,
+    /// Added to it.
+    pub margin: f64,
+}
+
+/// How errors of choices of several settings add up.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Together {
+    /// Share of the sum of their means: errors hide each other.
+    share: f64,
+    /// Factor on the root of the sum of squares of their margins.
+    factor: f64,
+}
+
+impl Together {
+    /// From combinations: what was expected of each choice, and the error that was measured. Those without an error are left out.
+    fn of(combinations: &[(Vec<Expected>, f64)]) -> Self {
+        let sums: Vec<(f64, f64, f64)> = (combinations.iter())
+            .map(|(parts, error)| {
+                let (mean, margin) = sums(parts);
+                (mean, margin, *error)
+            })
+            .filter(|(mean, margin, error)| *mean > LEAST_ERROR && *margin > 0.0 && *error > LEAST_ERROR)
+            .collect();
+        let share = quantile(sums.iter().map(|(mean, _, error)| error / mean).collect(), 0.5);
+        let over = |(mean, margin, error): &(f64, f64, f64)| (error - share * mean) / margin;
+        Self { share, factor: quantile(sums.iter().map(over).collect(), COVERED) }
+    }
+
+    /// Error that 95 % of frames do not exceed.
+    pub fn error(&self, parts: &[Expected]) -> f64 {
+        let (mean, margin) = sums(parts);
+        (self.share * mean + self.factor * margin).clamp(0.0, 1.0)
+    }
+}
+
+/// Sum of means, and root of the sum of squares of margins.
+fn sums(parts: &[Expected]) -> (f64, f64) {
+    let mean = parts.iter().map(|p| p.mean).sum();
+    (mean, parts.iter().map(|p| p.margin * p.margin).sum::<f64>().sqrt())
+}
+
+/// A combination of choices in a shot, and its error.
+#[derive(Clone, Debug)]
+pub struct Combined {
+    /// Index of the shot.
+    pub shot: usize,
+    /// Index of the choice of each group.
+    pub choices: Vec<usize>,
+    /// Mean FLIP and relative RMSE.
+    pub errors: [f64; 2],
+}
+
 /// Estimates for a device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -122,11 +185,16 @@ pub struct Calibration {
     base_ms: [f64; 2],
     /// Settings that are chosen.
     pub groups: Vec<Group>,
+    /// How their mean FLIP adds up.
+    flip: Together,
+    /// How their relative RMSE adds up.
+    relative_rmse: Together,
 }
 
 fn terms(f: &Features) -> [f64; TERMS] {
     let s = f.mm_per_pixel.max(1e-4).ln();
-    [1.0, s, s * s, f.share.max(1e-6).ln(), f.backlight, f.contrast]
+    let [relief, brightness] = [f.relief.max(1e-3).ln(), f.brightness.max(1e-2).ln()];
+    [1.0, s, s * s, f.share.max(1e-6).ln(), f.backlight, f.contrast, relief, brightness]
 }
 
 fn megapixels(f: &Features, size: [u32; 2]) -> f64 {
@@ -171,7 +239,12 @@ fn line(points: &[(f64, f64)]) -> [f64; 2] {
 impl Calibration {
     /// Fits a chart of shots whose features are known to their times, in one or more sizes of pictures; none if a group has
     /// too few shots or no times.
-    pub fn of(report: &ChartReport, features: &[Features], times: &[Times]) -> Option<Self> {
+    pub fn of(
+        report: &ChartReport,
+        features: &[Features],
+        times: &[Times],
+        combined: &[Combined],
+    ) -> Option<Self> {
         let mut groups = Vec::new();
         for (g, group) in report.groups.iter().enumerate() {
             let drive = match group.flag.as_str() {
@@ -217,7 +290,19 @@ impl Calibration {
             shots: features.len(),
             base_ms: [0.0; 2],
             groups,
+            flip: Together { share: 1.0, factor: 1.0 },
+            relative_rmse: Together { share: 1.0, factor: 1.0 },
         };
+        let together = |metric: Metric, of: usize| {
+            let expected = |c: &Combined| {
+                let parts = c.choices.iter().enumerate();
+                let parts = parts.map(|(g, choice)| calibration.error(metric, g, *choice, &features[c.shot]));
+                (parts.collect(), c.errors[of])
+            };
+            Together::of(&combined.iter().map(expected).collect::<Vec<_>>())
+        };
+        let both = [together(Metric::Flip, 0), together(Metric::RelativeRmse, 1)];
+        [calibration.flip, calibration.relative_rmse] = both;
         let mut places = Vec::new();
         for times in times {
             for (s, f) in features.iter().enumerate() {
@@ -234,11 +319,19 @@ impl Calibration {
         Some(calibration)
     }
 
-    /// Estimated error of a choice, which 95 % of shots do not exceed.
-    pub fn error(&self, metric: Metric, group: usize, choice: usize, f: &Features) -> f64 {
+    /// How errors of choices of several groups add up.
+    pub fn together(&self, metric: Metric) -> &Together {
+        match metric {
+            Metric::Flip => &self.flip,
+            Metric::RelativeRmse => &self.relative_rmse,
+        }
+    }
+
+    /// Expected error of a choice.
+    pub fn error(&self, metric: Metric, group: usize, choice: usize, f: &Features) -> Expected {
         let Some((group, choice)) = self.groups.get(group).and_then(|g| Some((g, g.choices.get(choice)?)))
         else {
-            return 0.0;
+            return Expected::default();
         };
         let estimate = match metric {
             Metric::Flip => &choice.flip,
@@ -246,9 +339,10 @@ impl Calibration {
         };
         match estimate {
             Some(e) if f.share > 0.0 => {
-                (group.drive.of(f) * (dot(&e.coefficients, &terms(f)) + e.margin).exp()).min(1.0)
+                let mean = (group.drive.of(f) * dot(&e.coefficients, &terms(f)).exp()).min(1.0);
+                Expected { mean, margin: (mean * e.margin.exp_m1()).min(1.0) }
             }
-            _ => 0.0,
+            _ => Expected::default(),
         }
     }
 
@@ -304,9 +398,11 @@ mod tests {
             share: 0.1 + 0.02 * f64::from(i % 7),
             backlight: f64::from(i % 3) / 3.0,
             contrast: f64::from(i % 5) / 5.0,
+            relief: 0.02 * f64::from(1 + i % 11),
+            brightness: 0.05 * f64::from(1 + i % 13),
             ..Features::default()
         };
-        let law = [-3.0, -0.5, 0.1, 0.2, 0.7, 0.3];
+        let law = [-3.0, -0.5, 0.1, 0.2, 0.7, 0.3, 0.4, 0.6];
         let rows: Vec<_> = (0..40).map(|i| (terms(&features(i)), dot(&law, &terms(&features(i))))).collect();
         let found = fit(&rows).unwrap();
         for (terms, value) in &rows {
@@ -316,6 +412,28 @@ mod tests {
         let [at_zero, slope] = line(&points);
         assert!((at_zero - 3.0).abs() < 1e-12 && (slope - 0.5).abs() < 1e-12);
         assert_eq!(line(&[(1.0, 2.0)]), [2.0, 0.0]);
+    }
+
+    #[test]
+    fn errors_together_cover_nineteen_of_twenty_combinations() {
+        let mut random = rubor_rig::random::SplitMix64(3);
+        let combinations: Vec<(Vec<Expected>, f64)> = (0..400)
+            .map(|_| {
+                let parts: Vec<Expected> = (0..3)
+                    .map(|_| {
+                        let mean = 0.01 + 0.02 * random.uniform();
+                        Expected { mean, margin: 0.5 * mean }
+                    })
+                    .collect();
+                let error = parts.iter().map(|p| 0.8 * p.mean + p.margin * (random.uniform() - 0.5)).sum();
+                (parts, error)
+            })
+            .collect();
+        let together = Together::of(&combinations);
+        assert!((together.share - 0.8).abs() < 0.03, "{together:?}");
+        let kept = combinations.iter().filter(|(parts, error)| *error <= together.error(parts)).count();
+        assert!((378..=382).contains(&kept), "{kept} of 400, {together:?}");
+        assert_eq!(together.error(&[]), 0.0);
     }
 
     #[test]

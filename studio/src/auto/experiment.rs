@@ -123,21 +123,6 @@ fn row(bound: f64, measured: &Measured, chosen: &[Chosen]) -> AutoRow {
     }
 }
 
-/// Every combination of the choices of the calibration.
-fn combinations(auto: &Auto) -> Vec<Vec<Option<usize>>> {
-    let mut all = vec![Vec::new()];
-    for group in &auto.calibration.groups {
-        let held = auto.held.contains(&group.flag);
-        let choices: Vec<Option<usize>> =
-            if held { vec![None] } else { (0..group.choices.len()).map(Some).collect() };
-        all = all
-            .into_iter()
-            .flat_map(|c| choices.iter().map(move |choice| [c.clone(), vec![*choice]].concat()))
-            .collect();
-    }
-    all
-}
-
 fn measure(
     studio: &mut Studio,
     base: &Settings,
@@ -146,7 +131,7 @@ fn measure(
     timing: Timing,
     watch: &mut dyn Watch,
 ) -> Outcome<Measured> {
-    let combinations = combinations(auto);
+    let combinations = auto.combinations();
     let settings = |c: &Vec<Option<usize>>| {
         let chosen = Chosen { choices: c.clone(), ..Chosen::default() };
         auto.settings(base, &chosen)

@@ -1,25 +1,29 @@
 //! Measures a device for settings by need: random shots, what they show, errors and times of choices.
 //!
 //! ```text
-//! head --random_shots--> scenes --chart--> errors \
-//!                            +--times in two sizes--> Calibration
+//! head --random_shots--> scenes --chart--> errors of choices \
+//!                            +--errors of random combinations--> Calibration
+//!                            +--times in two sizes /
 //! ```
 
-use rubor_renderer::settings::Settings;
+use rubor_renderer::settings::{AntialiasMethod, Leaf, ScatterMethod, Settings};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
+use rubor_rig::random::SplitMix64;
 
-use super::calibration::Times;
+use super::calibration::{Combined, Times};
 use super::shots::{calibrated, random_shots};
 use super::{Calibration, Features, Outline};
 use crate::error::{Failure, Outcome};
-use crate::measure::chart::{self, Effort, RightLight, Suite, Timing};
+use crate::measure::chart::{self, Effort, Group, Measure, RightLight, Scene, Suite, Timing, Truth, draw};
 use crate::report::ChartReport;
 use crate::studio::Studio;
 use crate::watch::Watch;
 
 /// Seed of the random shots.
 const SEED: u64 = 1;
+/// Random combinations of choices in a shot.
+const COMBINATIONS: usize = 8;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +71,7 @@ pub fn run(
     studio.set_heads([head])?;
     let untimed = chart::Options { timing: None, folder: None, light: false };
     let report = chart::run(studio, base, &scenes, &groups(base)?, &untimed, watch)?;
+    let combined = combined(studio, &scenes, &groups(base)?, base, watch)?;
     let mut times = Vec::new();
     for size in [base.output.size, options.large] {
         let mut sized = base.clone();
@@ -78,7 +83,52 @@ pub fn run(
     }
     let outline = Outline::of(head);
     let features: Vec<_> = scenes.iter().map(|s| outline.features(&s.shot, base.output.size)).collect();
-    let calibration = Calibration::of(&report, &features, &times)
+    let calibration = Calibration::of(&report, &features, &times, &combined)
         .ok_or_else(|| Failure::job("the shots do not suffice for estimates").hint("more --shots"))?;
     Ok(Measured { calibration, features, report })
+}
+
+/// Draws random combinations of choices in scenes and measures how far they are from full quality.
+fn combined(
+    studio: &mut Studio,
+    scenes: &[Scene],
+    groups: &[Group],
+    base: &Settings,
+    watch: &mut dyn Watch,
+) -> Outcome<Vec<Combined>> {
+    let mut random = SplitMix64(SEED);
+    let mut all = Vec::new();
+    let right = full_quality(base)?;
+    watch.begin("combinations", scenes.len() as u64);
+    for (shot, scene) in scenes.iter().enumerate() {
+        let truth = Truth::draw(studio, scene, &right, Measure::Picture, base)?;
+        for _ in 0..COMBINATIONS {
+            let choices: Vec<usize> = groups.iter().map(|g| random.below(g.choices.len())).collect();
+            let mut settings = base.clone();
+            for (group, choice) in groups.iter().zip(&choices) {
+                let (_, chosen) = &group.choices[*choice];
+                if let (Some(leaf), Ok(all)) = (Leaf::of_flag(&group.flag), serde_json::to_value(chosen)) {
+                    settings.overlay(&leaf.change(leaf.value_in(&all)))?;
+                }
+            }
+            let (error, _) = truth.error(&draw(studio, scene, &settings, false)?);
+            all.push(Combined { shot, choices, errors: [error.flip_mean, error.relative_rmse] });
+        }
+        watch.step();
+    }
+    watch.end();
+    Ok(all)
+}
+
+/// What combinations of choices are compared with: the last choice of each, and more taps and samples than any of them.
+pub(super) fn full_quality(base: &Settings) -> Outcome<Settings> {
+    let mut right = base.clone();
+    for (flag, values) in calibrated()? {
+        if let (Some(leaf), Some(value)) = (Leaf::of_flag(&flag), values.last()) {
+            right.overlay(&leaf.change(value))?;
+        }
+    }
+    right.quality.scatter = ScatterMethod::Separable(65);
+    right.quality.antialias = AntialiasMethod::Ssaa(8);
+    Ok(right)
 }

@@ -6,8 +6,8 @@
 //!                                             bound, choices of the frame before / --> choices of the frame, and why
 //! ```
 //!
-//! The error is the mean FLIP over the head, or the relative RMSE, against the same frame with the last choice of every group;
-//! errors of groups add up. Choices follow from the sequence alone, frame by frame from the first: any part of a job, on any machine, draws the
+//! The error is the mean FLIP over the head, or the relative RMSE, against the same frame with the last choice of every group.
+//! Choices follow from the sequence alone, frame by frame from the first: any part of a job, on any machine, draws the
 //! frames of the whole. The estimates are those of one device ([`Calibration`]); the job holds them.
 //!
 //! A frame has one choice for all of its heads; its error is the mean over the pixels of all of them.
@@ -25,7 +25,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 pub use calibration::Calibration;
-use calibration::Metric;
+use calibration::{Expected, Metric};
 pub use features::{Features, Outline, features_of};
 pub use shots::{CALIBRATED, unseen_shots};
 
@@ -40,7 +40,7 @@ const SHIPPED: &str = include_str!("h200.json");
 const HYSTERESIS: f64 = 0.85;
 
 /// Most combinations of choices that are tried for a frame.
-const MOST_COMBINATIONS: usize = 100_000;
+const MOST_COMBINATIONS: usize = 10_000;
 
 /// What limits a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -107,6 +107,14 @@ pub struct Auto {
     /// Estimates of a device.
     #[schemars(with = "serde_json::Value")]
     pub calibration: Calibration,
+}
+
+/// What a choice is expected to do in a frame.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    flip: Expected,
+    relative_rmse: Expected,
+    milliseconds: f64,
 }
 
 /// What was chosen for a frame.
@@ -188,7 +196,7 @@ impl Auto {
         let combinations = groups.iter().try_fold(1usize, |n, g| n.checked_mul(g.choices.len()));
         if !combinations.is_some_and(|n| (1..=MOST_COMBINATIONS).contains(&n)) {
             let found = combinations.map_or("more".into(), |n| n.to_string());
-            return wrong("calibration.groups".into(), found, "1 to 100000 combinations of choices");
+            return wrong("calibration.groups".into(), found, "1 to 10000 combinations of choices");
         }
         Ok(())
     }
@@ -198,23 +206,62 @@ impl Auto {
         self.calibration.groups.iter().any(|g| g.flag == flag) && !self.held.iter().any(|h| h == flag)
     }
 
-    /// Error and time of some choices, for heads with these features.
-    fn estimate(&self, choices: &[Option<usize>], heads: &[Features], size: [u32; 2]) -> Chosen {
+    /// Every combination of choices: an index for each group, none where the setting is held.
+    pub(crate) fn combinations(&self) -> Vec<Vec<Option<usize>>> {
+        let mut all = vec![Vec::new()];
+        for group in &self.calibration.groups {
+            let is_held = self.held.contains(&group.flag);
+            let choices: Vec<Option<usize>> =
+                if is_held { vec![None] } else { (0..group.choices.len()).map(Some).collect() };
+            let longer = |c: Vec<Option<usize>>| {
+                choices.iter().map(move |choice| [&c[..], &[*choice]].concat()).collect::<Vec<_>>()
+            };
+            all = all.into_iter().flat_map(longer).collect();
+        }
+        all
+    }
+
+    /// Error and time of each choice of each group, for heads with these features.
+    fn parts(&self, heads: &[Features], size: [u32; 2]) -> Vec<Vec<Part>> {
         let calibration = &self.calibration;
         // Errors are means over the pixels of all heads; what a pass costs before its first pixel is paid once.
         let share: f64 = heads.iter().map(|f| f.share).sum();
         let all = Features { share, ..Features::default() };
-        let milliseconds = calibration.base_ms(&all, size);
-        let mut chosen = Chosen { choices: choices.to_vec(), milliseconds, ..Chosen::default() };
-        for (g, choice) in choices.iter().enumerate().filter_map(|(g, c)| Some((g, (*c)?))) {
+        let part = |g: usize, choice: usize| {
             let error = |metric| {
-                let of = |f: &Features| f.share * calibration.error(metric, g, choice, f);
-                heads.iter().map(of).sum::<f64>() / share.max(1e-9)
+                let mut mean = Expected::default();
+                for f in heads {
+                    let of = calibration.error(metric, g, choice, f);
+                    mean.mean += of.mean * f.share / share.max(1e-9);
+                    mean.margin += of.margin * f.share / share.max(1e-9);
+                }
+                mean
             };
-            chosen.flip += error(Metric::Flip);
-            chosen.relative_rmse += error(Metric::RelativeRmse);
-            chosen.milliseconds += calibration.cost_ms(g, choice, &all, size);
-        }
+            Part {
+                flip: error(Metric::Flip),
+                relative_rmse: error(Metric::RelativeRmse),
+                milliseconds: calibration.cost_ms(g, choice, &all, size),
+            }
+        };
+        let groups = calibration.groups.iter().enumerate();
+        groups.map(|(g, group)| (0..group.choices.len()).map(|c| part(g, c)).collect()).collect()
+    }
+
+    /// Error and time of some choices, from those of each.
+    fn estimate(&self, choices: Vec<Option<usize>>, base_ms: f64, parts: &[Vec<Part>]) -> Chosen {
+        let made: Vec<&Part> =
+            choices.iter().zip(parts).filter_map(|(choice, of)| of.get((*choice)?)).collect();
+        let error = |metric, of: fn(&Part) -> Expected| {
+            let parts: Vec<Expected> = made.iter().map(|p| of(p)).collect();
+            self.calibration.together(metric).error(&parts)
+        };
+        let mut chosen = Chosen {
+            flip: error(Metric::Flip, |p| p.flip),
+            relative_rmse: error(Metric::RelativeRmse, |p| p.relative_rmse),
+            milliseconds: base_ms + made.iter().map(|p| p.milliseconds).sum::<f64>(),
+            choices,
+            is_kept: false,
+        };
         chosen.is_kept = match self.bound {
             Bound::Flip(most) => chosen.flip <= most,
             Bound::RelativeRmse(most) => chosen.relative_rmse <= most,
@@ -233,36 +280,29 @@ impl Auto {
 
     /// Choices for a frame after those of the frame before, for heads with these features.
     pub fn choose(&self, heads: &[Features], size: [u32; 2], before: Option<&Chosen>) -> Chosen {
-        // Errors and costs of groups add up, so what is slower and worse before a group is so after it.
-        let mut front = vec![Vec::new()];
-        let mut all = Vec::new();
-        for group in &self.calibration.groups {
-            let is_held = self.held.contains(&group.flag);
-            let choices = if is_held { vec![None] } else { (0..group.choices.len()).map(Some).collect() };
-            let longer =
-                front.iter().flat_map(|c| choices.iter().map(move |choice| [&c[..], &[*choice]].concat()));
-            all = longer.map(|c| self.estimate(&c, heads, size)).collect();
-            let error = |c: &Chosen| self.error(c);
-            all.sort_by(|a, b| a.milliseconds.total_cmp(&b.milliseconds).then(error(a).total_cmp(&error(b))));
-            let mut least = f64::INFINITY;
-            all.retain(|c| {
-                let is_nearer = error(c) < least;
-                least = least.min(error(c));
-                is_nearer
-            });
-            front = all.iter().map(|c| c.choices.clone()).collect();
-        }
+        let share = heads.iter().map(|f| f.share).sum();
+        let base_ms = self.calibration.base_ms(&Features { share, ..Features::default() }, size);
+        let parts = self.parts(heads, size);
+        let estimate = |choices: Vec<Option<usize>>| self.estimate(choices, base_ms, &parts);
+        let mut all: Vec<Chosen> = self.combinations().into_iter().map(estimate).collect();
+        all.sort_by(|a, b| {
+            a.milliseconds.total_cmp(&b.milliseconds).then(self.error(a).total_cmp(&self.error(b)))
+        });
         // Along the front the time rises and the error falls.
-        let [Some(fastest), Some(nearest)] = [all.first(), all.last()] else {
-            return self.estimate(&[], heads, size);
-        };
+        let mut least = f64::INFINITY;
+        all.retain(|c| {
+            let is_nearer = self.error(c) < least;
+            least = least.min(self.error(c));
+            is_nearer
+        });
+        let [Some(fastest), Some(nearest)] = [all.first(), all.last()] else { return estimate(Vec::new()) };
         let under = |share: f64| match self.bound {
             Bound::Flip(most) | Bound::RelativeRmse(most) => {
                 all.iter().find(|c| self.error(c) <= share * most)
             }
             Bound::Milliseconds(most) => all.iter().rfind(|c| c.milliseconds <= share * most),
         };
-        let stays = before.map(|b| self.estimate(&b.choices, heads, size)).filter(|c| c.is_kept);
+        let stays = before.map(|b| estimate(b.choices.clone())).filter(|c| c.is_kept);
         let Some(stays) = stays else {
             let none = if matches!(self.bound, Bound::Milliseconds(_)) { fastest } else { nearest };
             return under(1.0).unwrap_or(none).clone();

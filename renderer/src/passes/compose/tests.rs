@@ -38,7 +38,7 @@ fn diffuse_light_times_albedo_plus_direct_light_stands_before_the_background() {
             let attachment = crate::device::depth_attachment(depth.view(), load);
             drop(r.timer.render(gpu, r.encoder, "clear", &[], attachment));
             let [scattered, albedo, direct] = &images;
-            Compose::new(gpu).record(r, background, [scattered, albedo, direct, &depth])
+            Compose::new(gpu).record(r, background, [scattered, albedo, direct, &depth], None)
         });
         for (i, found) in read_image::<[half::f16; 4]>(gpu, &hdr).iter().enumerate() {
             let expected = composed(scattered[i], albedo[i], direct[i], is_seen, background);

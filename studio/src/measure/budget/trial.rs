@@ -20,7 +20,7 @@ use rubor_rig::timeline::Sequence;
 use super::looks::Look;
 use super::needed_names;
 use crate::error::Outcome;
-use crate::measure::chart::{Measure, Truth, draw};
+use crate::measure::chart::{Measure, Scene, Truth, draw};
 use crate::report::BudgetError;
 use crate::studio::Studio;
 
@@ -91,7 +91,7 @@ impl<'a> Trials<'a> {
         let mut truths = Vec::new();
         for look in looks {
             let of = &settings[look.sequence];
-            truths.push(Truth::draw(studio, &look.shot, of, Measure::Picture, of)?);
+            truths.push(Truth::draw(studio, &Scene::of("", look.shot.clone()), of, Measure::Picture, of)?);
         }
         let (device_bytes, hairs) = (studio.head_bytes(), studio.hairs());
         let known = looks.iter().map(|look| vec![(look.shot.face.clone(), 0.0)]).collect();
@@ -186,7 +186,7 @@ impl<'a> Trials<'a> {
 
     fn draw(&mut self, look: usize, shot: &Shot) -> Outcome<f64> {
         let settings = &self.settings[self.looks[look].sequence];
-        let drawn = draw(self.studio, shot, settings, false)?;
+        let drawn = draw(self.studio, &Scene::of("", shot.clone()), settings, false)?;
         self.drawn += 1;
         Ok(self.truths[look].error(&drawn).0.flip_mean)
     }

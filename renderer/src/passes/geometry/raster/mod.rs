@@ -36,7 +36,7 @@ const RESOLVE_SHADER: Module = module!("raster_resolve", "resolve.wesl");
 /// Close-ups have most: every triangle before a lamp that is fitted to what the camera sees.
 const LARGE_CAPACITY: u32 = 131_072;
 /// Workgroups that share the large triangles of a head.
-const LARGE_GROUPS: u32 = 1024;
+const LARGE_GROUPS: u32 = 8192;
 
 /// Rows of pixels of a workgroup of `raster_resolve`.
 const RESOLVED_ROWS: u32 = 32;

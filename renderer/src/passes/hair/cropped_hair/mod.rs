@@ -5,6 +5,8 @@
 //! hair map, rest mesh --roots, once--> triangle, place, flow, length
 //! roots, positions, frames, light --light_hairs--> ends, light, motion of each hair
 //! hairs, depth (tested), hdr --cropped_hair--> hdr, velocity (premultiplied over)
+//!
+//! roots, ..., depth (tested) --cover_hairs--> sums of each pixel --compose--> hdr     where triangles are drawn by compute
 //! ```
 //!
 //! A hair is one triangle of 0.14 mm at its root, drawn no thinner than a pixel and faded by its missing width. Its
@@ -18,11 +20,18 @@
 //! A head may keep fewer hairs than grow ([`SkinMaps::hair_count`](rubor_rig::head::SkinMaps::hair_count)): the first ones, which then stand
 //! for all in the same way.
 //!
+//! Where triangles are drawn by compute ([`Rasteriser::Compute`]), one invocation lights a hair that is seen and sums it up in the pixels whose
+//! centres its triangle holds: optical depth `tau = -ln(1 - opacity)` and radiance times `tau`. [`Compose`](crate::passes::compose) then puts the mean
+//! radiance over the picture with the coverage `1 - exp(-sum of tau)`: what hairs in random order show on average, which needs no order (McGuire and Bavoil 2013,
+//! with the weight `tau`). Sums are integers, so their order does not matter and frames repeat bit by bit. Opaque hairs would look like glass, so heads
+//! so near that a hair may be as wide as the thinnest line, and frames with motion, are drawn by the raster units.
+//!
 //! Does not: sort (hairs of one colour), cast shadows.
 
 #[cfg(test)]
 mod tests;
 
+use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Draw, Gpu, Image, Kernel, Recorder};
 use crate::passes::geometry::raster::Rasteriser;
@@ -37,9 +46,19 @@ use glam::Vec3;
 
 const SHADER: Module = module!("cropped_hair", "cropped_hair.wesl");
 
+/// Steps of the sums of hairs for a unit of optical depth, or of radiance times it.
+pub(crate) const HAIR_UNIT: f32 = 65536.0;
+/// Width of a hair over what is drawn, on the nearest part of a head, up to which sums stand for its hairs.
+const MOST_SUMMED_OPACITY: f32 = 1.0;
+/// Width of a hair that is thinner, pixels, as in the shader.
+const THINNEST_PIXELS: f32 = 1.1;
+/// Most bytes for sums; larger frames use the raster units.
+const MOST_SUMS: u64 = 1 << 28;
+
 /// The shader of the pass.
 pub(crate) fn program() -> Program {
-    Program::new(SHADER).with(&fibre::MODULES).constant("WIDTH", WIDTH_METRES)
+    let constants = Program::new(SHADER).with(&fibre::MODULES).constant("WIDTH", WIDTH_METRES);
+    constants.constant("HAIR_UNIT", HAIR_UNIT)
 }
 
 #[repr(C)]
@@ -55,6 +74,17 @@ pub(crate) struct Params {
 pub(crate) struct CroppedHair {
     light: Kernel,
     kernels: Blended,
+    /// Where triangles are drawn by compute.
+    cover: Option<Kernel>,
+    /// Sums of each pixel, zero between frames; empty where hairs are not summed.
+    sums: wgpu::Buffer,
+}
+
+/// How the hairs of a head are drawn in a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    Summed,
+    Blended,
 }
 
 impl CroppedHair {
@@ -64,62 +94,143 @@ impl CroppedHair {
         Self {
             light: Kernel::new(gpu, "light hairs", &lighting, "light_hairs"),
             kernels: Blended::new(gpu, rasteriser, "cropped hair", program(), entries),
+            cover: rasteriser.stores_depth().then(|| {
+                Kernel::new(gpu, "cover hairs", &lighting.flag("tests_depth", true), "cover_hairs")
+            }),
+            sums: gpu.storage_zeroed("sums of hairs", 0),
         }
     }
 
-    /// Draws the hairs of heads over a picture and, where there is one, over its motion.
+    /// Makes what frames of so many pixels need, with or without hairs.
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, pixels: u64, has_hairs: bool) {
+        let most = MOST_SUMS.min(gpu.device.limits().max_storage_buffer_binding_size);
+        let wanted = if self.cover.is_some() && has_hairs && 16 * pixels <= most { 16 * pixels } else { 0 };
+        if self.sums.size() != wanted.max(16) {
+            self.sums = gpu.storage_zeroed("sums of hairs", wanted);
+        }
+    }
+
+    /// Bytes that it keeps on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.sums.size()
+    }
+
+    /// How the hairs of a head are drawn.
+    fn way(&self, seen: &Seen, head: &PosedHead<'_>, moves: bool) -> Way {
+        let [width, height] = seen.ids.size().map(u64::from);
+        let pixel = seen.pixel_metres(head.index);
+        let is_thin = WIDTH_METRES <= MOST_SUMMED_OPACITY * THINNEST_PIXELS * pixel;
+        match self.cover.is_some() && self.sums.size() >= 16 * width * height && is_thin && !moves {
+            true => Way::Summed,
+            false => Way::Blended,
+        }
+    }
+
+    /// Sums up the hairs of heads that are drawn so, for a frame with or without motion; none if there are none.
+    pub(crate) fn cover(
+        &self,
+        r: &mut Recorder<'_>,
+        hair: (&Fibre, &Illumination<'_>),
+        detail: DetailMethod,
+        seen: &Seen,
+        heads: &[PosedHead<'_>],
+        moves: bool,
+    ) -> Option<&wgpu::Buffer> {
+        let kernel = self.cover.as_ref()?;
+        let drawn = self.drawn(seen, heads, moves, Way::Summed);
+        if drawn.is_empty() {
+            return None;
+        }
+        let params = numbers(detail, seen, &drawn);
+        let ends = [("sums", self.sums.bound()), ("scene_depth", seen.depth.bound())];
+        self.light(r, kernel, hair, seen, &drawn, &params, |_| ends.to_vec());
+        Some(&self.sums)
+    }
+
+    /// Heads whose hairs are drawn in a way.
+    fn drawn<'h, 'a>(
+        &self,
+        seen: &Seen,
+        heads: &'h [PosedHead<'a>],
+        moves: bool,
+        way: Way,
+    ) -> Vec<&'h PosedHead<'a>> {
+        let has_hairs = |h: &&PosedHead<'_>| h.head.hair_root_count > 0 && h.head.maps.is_some();
+        heads.iter().filter(has_hairs).filter(|h| self.way(seen, h, moves) == way).collect()
+    }
+
+    /// Runs a kernel once for each hair of heads; `out` is what else it binds.
+    fn light<'r>(
+        &self,
+        r: &mut Recorder<'_>,
+        kernel: &Kernel,
+        (fibre, light): (&Fibre, &'r Illumination<'_>),
+        seen: &'r Seen,
+        drawn: &[&'r PosedHead<'_>],
+        params: &[Params],
+        out: impl Fn(&'r PosedHead<'_>) -> Vec<Resource<'r>>,
+    ) {
+        let hair_light = fibre.params(r, light);
+        let buffers: Vec<_> = params.iter().map(|p| r.uniform("cropped hair", p)).collect();
+        let each: Vec<_> = drawn
+            .iter()
+            .zip(params.iter().zip(&buffers))
+            .map(|(h, (params, buffer))| {
+                let mut resources = vec![
+                    ("view", seen.view.bound()),
+                    ("params", buffer.bound()),
+                    ("positions", h.positions.bound()),
+                    ("vertices", h.head.vertices.bound()),
+                    ("triangles", h.head.triangles.bound()),
+                    ("frames", h.tangent_frames.bound()),
+                    ("roots", h.head.hair_roots.bound()),
+                ];
+                resources.extend(out(h));
+                resources.extend(fibre.resources(&hair_light, light));
+                (resources, [params.count.div_ceil(64), 1, 1])
+            })
+            .collect();
+        r.dispatch_each(kernel, each);
+    }
+
+    /// Draws the hairs of heads that are not summed up over a picture and, where there is one, over its motion.
     pub(crate) fn record(
         &self,
         r: &mut Recorder<'_>,
-        (fibre, light): (&Fibre, &Illumination<'_>),
+        hair: (&Fibre, &Illumination<'_>),
         detail: DetailMethod,
         seen: &Seen,
         heads: &[PosedHead<'_>],
         hdr: &Image,
         velocity: Option<&Image>,
     ) {
-        let drawn: Vec<_> =
-            heads.iter().filter(|h| h.head.hair_root_count > 0 && h.head.maps.is_some()).collect();
+        let drawn = self.drawn(seen, heads, velocity.is_some(), Way::Blended);
         if drawn.is_empty() {
             return;
         }
-        let hair_light = fibre.params(r, light);
-        let numbers = |h: &&PosedHead<'_>| {
-            let color = h.head.maps.as_ref().map_or([0.0; 3], |m| m.hair_color_linear);
-            let [most, all] = h.head.hair_counts();
-            let count = match detail {
-                DetailMethod::Full => most,
-                DetailMethod::Auto => drawn_hairs(all, seen.pixel_metres(h.index)).min(most),
-            };
-            Params {
-                color: Vec3::from(color).extend(1.0).to_array(),
-                count,
-                share: all as f32 / count as f32,
-                padding: [0; 2],
-            }
-        };
-        let params: Vec<Params> = drawn.iter().map(numbers).collect();
-        let buffers: Vec<_> = params.iter().map(|p| r.uniform("cropped hair", p)).collect();
-        let each = drawn.iter().zip(params.iter().zip(&buffers)).map(|(h, (params, buffer))| {
-            let mut resources = vec![
-                ("view", seen.view.bound()),
-                ("params", buffer.bound()),
-                ("positions", h.positions.bound()),
-                ("vertices", h.head.vertices.bound()),
-                ("triangles", h.head.triangles.bound()),
-                ("frames", h.tangent_frames.bound()),
-                ("roots", h.head.hair_roots.bound()),
-                ("previous_positions", h.previous_positions.bound()),
-                ("lit_out", h.hairs.bound()),
-            ];
-            resources.extend(fibre.resources(&hair_light, light));
-            (resources, [params.count.div_ceil(64), 1, 1])
+        let params = numbers(detail, seen, &drawn);
+        self.light(r, &self.light, hair, seen, &drawn, &params, |h| {
+            vec![("previous_positions", h.previous_positions.bound()), ("lit_out", h.hairs.bound())]
         });
-        r.dispatch_each(&self.light, each);
         let each = drawn
             .iter()
             .zip(&params)
             .map(|(h, params)| (vec![("hairs", h.hairs.bound())], Draw::Corners(params.count * 3)));
         self.kernels.record(r, [hdr, &seen.depth], velocity, each);
     }
+}
+
+/// Colours and numbers of hairs of heads.
+fn numbers(detail: DetailMethod, seen: &Seen, drawn: &[&PosedHead<'_>]) -> Vec<Params> {
+    let of = |h: &&PosedHead<'_>| {
+        let color = h.head.maps.as_ref().map_or([0.0; 3], |m| m.hair_color_linear);
+        let [most, all] = h.head.hair_counts();
+        let count = match detail {
+            DetailMethod::Full => most,
+            DetailMethod::Auto => drawn_hairs(all, seen.pixel_metres(h.index)).min(most),
+        };
+        let share = all as f32 / count as f32;
+        Params { color: Vec3::from(color).extend(1.0).to_array(), count, share, padding: [0; 2] }
+    };
+    drawn.iter().map(of).collect()
 }

@@ -1,19 +1,19 @@
 use glam::{Mat4, Quat};
 use rubor_rig::face_state::FaceState;
-use rubor_rig::head::{Material, Part, Vertex};
+use rubor_rig::head::{Head, Material, Part, Vertex};
 use rubor_rig::map::Map;
 
 use super::*;
 use crate::channels::Channel;
 use crate::scene::hair_roots::{self, Root};
 use crate::scene::posed_head::{HAIR_BYTES, Instance};
-use crate::settings::AntialiasMethod;
+use crate::settings::{AntialiasMethod, RasterMethod};
 use crate::testing::{assert_layout, assert_raster, assert_workgroups, offsets};
 use crate::tests::{WHITE_TABLE, dome, lamp, read, render, renderer, settings};
-use crate::{Camera, HeadInstance, HeadOnGpu, Scene};
+use crate::{Camera, HeadInstance, HeadOnGpu, Renderer, Scene};
 
 /// The dome with hair on the half of its texture where v is under one half, and its triangles.
-fn half_haired() -> (rubor_rig::head::Head, Vec<[u32; 4]>) {
+fn half_haired() -> (Head, Vec<[u32; 4]>) {
     let mut head = dome();
     let side = 64;
     let mut hair = Map::filled(side, side, &[0.0]);
@@ -28,6 +28,8 @@ fn shader_is_valid_and_laid_out_as_here() {
     assert_raster(&program(), &["cropped_hair_vertex", "cropped_hair_fragment"]);
     let entry = "light_hairs";
     assert_workgroups(&program(), &[(entry, [64, 1, 1])]);
+    let covering = program().flag("tests_depth", true).flag("stored_shadows", true);
+    assert_workgroups(&covering, &[("cover_hairs", [64, 1, 1])]);
     assert_layout(
         &program(),
         entry,
@@ -212,4 +214,91 @@ fn hairs_come_one_by_one_and_all_are_drawn_near_by() {
     }
     assert!(last < 60, "{last}");
     assert_eq!(drawn_hairs(7, f32::MAX), 1);
+}
+
+/// The dome with hairs, from so far that a pixel is so many metres wide, by raster units and by sums.
+fn both_ways(renderer: &mut Renderer, (rest, head): (&Head, &HeadOnGpu), pixel_metres: f32, fov_degrees: f32) -> [Vec<[f32; 4]>; 2] {
+    let size = 160;
+    let distance = 0.5 * size as f32 * pixel_metres / (0.5 * fov_degrees.to_radians()).tan();
+    let state = FaceState { head_rotation: Quat::from_rotation_x(0.5), ..FaceState::neutral(rest) };
+    let lights = [lamp()];
+    [RasterMethod::Hardware, RasterMethod::Compute].map(|raster| {
+        let scene = Scene {
+            heads: &[HeadInstance { head, state: &state, world_from_head: Mat4::IDENTITY }],
+            camera: Camera { position: distance * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees },
+            lights: &lights,
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::splat(0.02),
+        };
+        let mut settings = settings([size; 2]);
+        settings.quality.raster = raster;
+        settings.output.channels = vec![Channel::Radiance];
+        render(renderer, &scene, &settings).expect("it draws");
+        read(renderer, Channel::Radiance).texels::<4>().collect()
+    })
+}
+
+#[test]
+fn a_summed_hair_covers_the_pixels_of_its_triangle() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
+    let all = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    head.maps.hair = None;
+    let bald = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
+    // So few hairs that hardly any two share a pixel: the first ones, each for itself alone.
+    let few = (all.hair_root_count / 150).max(40);
+    head.maps.hair_count = Some(few);
+    let haired = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    let [without, _] = both_ways(&mut renderer, (&head, &bald), 0.0006, 5.0);
+    let [blended, summed] = both_ways(&mut renderer, (&head, &haired), 0.0006, 5.0);
+    let apart = |a: &[f32; 4], b: &[f32; 4]| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max);
+    let of_hair: Vec<usize> = (0..blended.len()).filter(|i| apart(&blended[*i], &without[*i]) > 0.005).collect();
+    assert!(of_hair.len() > 200, "{} pixels of {few} hairs", of_hair.len());
+    let differ = of_hair.iter().filter(|i| apart(&blended[**i], &summed[**i]) > 0.01).count();
+    // Corners of the raster units are rounded, and some pixels do hold two hairs.
+    assert!(differ <= of_hair.len() / 10, "{differ} of {} pixels differ", of_hair.len());
+    let only_summed = (0..summed.len())
+        .filter(|i| apart(&summed[*i], &without[*i]) > 0.01 && apart(&blended[*i], &without[*i]) < 1e-4)
+        .count();
+    assert!(only_summed <= of_hair.len() / 50, "{only_summed} pixels have no hair of the raster units");
+}
+
+#[test]
+fn sums_of_dense_hair_are_what_its_layers_show() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    for pixel_metres in [0.0003, 0.0012] {
+        let [blended, summed] = both_ways(&mut renderer, (&head, &on_gpu), pixel_metres, 5.0);
+        let [again, _] = both_ways(&mut renderer, (&head, &on_gpu), pixel_metres, 5.0);
+        assert_eq!(blended, again);
+        let blocks = |picture: &[[f32; 4]]| -> Vec<f64> {
+            let at = |x: usize, y: usize| f64::from(picture[y * 160 + x][1]);
+            let block =
+                |b: usize| (0..64).map(|i| at(8 * (b % 20) + i % 8, 8 * (b / 20) + i / 8)).sum::<f64>() / 64.0;
+            (0..400).map(block).collect()
+        };
+        let (a, b) = (blocks(&blended), blocks(&summed));
+        let mean = |blocks: &[f64]| blocks.iter().sum::<f64>() / blocks.len() as f64;
+        let apart = (a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt();
+        assert!((mean(&b) / mean(&a) - 1.0).abs() < 0.01, "{} and {}", mean(&a), mean(&b));
+        assert!(apart < 0.03 * mean(&a), "{apart} of {}", mean(&a));
+    }
+}
+
+#[test]
+fn sums_are_for_thin_hairs_of_frames_without_motion() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut head = dome();
+    head.maps.hair = Some(Map::filled(8, 8, &[0.9]));
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("the dome uploads");
+    // Opaque hairs, near by: the raster units draw them whatever draws triangles.
+    let [blended, summed] = both_ways(&mut renderer, (&head, &on_gpu), 0.00005, 5.0);
+    let differ = blended.iter().zip(&summed).filter(|(a, b)| (a[1] - b[1]).abs() > 0.02).count();
+    assert!(differ < blended.len() / 200, "{differ} pixels");
 }
