@@ -104,8 +104,7 @@ impl<'a> Plan<'a> {
         let size = self.job.settings.output.size;
         let end = self.frames.last().map_or(0, |last| last + 1);
         let outlines: Vec<&Outline> = outlines.iter().collect();
-        let features =
-            (0..end).map(|frame| features_of(&outlines, &self.shots(frame), self.spacing_m, size));
+        let features = (0..end).map(|frame| features_of(&outlines, &self.shots(frame), self.spacing_m, size));
         self.chosen = auto.run(features, size);
         self.settings_of_frames =
             self.chosen.iter().map(|c| auto.settings(&self.settings, c)).collect::<Outcome<_>>()?;

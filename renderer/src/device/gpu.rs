@@ -84,6 +84,7 @@ pub(crate) async fn list_adapters() -> Vec<AdapterDescription> {
 const WELCOME_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::PRIMITIVE_INDEX)
     .union(wgpu::Features::SHADER_INT64)
+    .union(wgpu::Features::FLOAT32_FILTERABLE)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
 
 impl Gpu {
@@ -192,6 +193,11 @@ impl Gpu {
     #[cfg(not(target_arch = "wasm32"))]
     pub(crate) fn take_wanted(&self) -> Option<wgpu::SubmissionIndex> {
         self.wanted.lock().ok().and_then(|mut slot| slot.take())
+    }
+
+    /// Whether shaders may gather four texels of floats at once.
+    pub(crate) fn gathers(&self) -> bool {
+        self.device.features().contains(wgpu::Features::FLOAT32_FILTERABLE)
     }
 
     /// A shader module from WGSL.

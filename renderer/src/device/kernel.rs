@@ -125,7 +125,7 @@ impl Kernel {
         entry: &str,
         compilation_options: wgpu::PipelineCompilationOptions<'_>,
     ) -> Self {
-        let linked = program.link(&[entry], gpu.stores_uniforms);
+        let linked = program.clone().flag("gathers", gpu.gathers()).link(&[entry], gpu.stores_uniforms);
         let module = gpu.shader(label, &linked.wgsl);
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(label),
@@ -144,7 +144,8 @@ impl RasterKernel {
     /// A pipeline with a vertex and, optionally, a fragment entry point.
     pub(crate) fn new(gpu: &Gpu, raster: &Raster<'_>) -> Self {
         let entries: Vec<&str> = std::iter::once(raster.vertex).chain(raster.fragment).collect();
-        let linked = raster.program.link(&entries, gpu.stores_uniforms);
+        let program = raster.program.clone().flag("gathers", gpu.gathers());
+        let linked = program.link(&entries, gpu.stores_uniforms);
         let module = gpu.shader(raster.label, &linked.wgsl);
         let fragment = raster.fragment.map(|entry| wgpu::FragmentState {
             module: &module,

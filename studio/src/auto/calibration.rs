@@ -319,6 +319,14 @@ impl Calibration {
         Some(calibration)
     }
 
+    /// With margins by a factor wider.
+    pub(super) fn widened(mut self, factor: f64) -> Self {
+        for together in [&mut self.flip, &mut self.relative_rmse] {
+            together.factor = together.factor.max(0.1) * factor;
+        }
+        self
+    }
+
     /// How errors of choices of several groups add up.
     pub fn together(&self, metric: Metric) -> &Together {
         match metric {

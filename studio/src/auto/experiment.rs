@@ -166,8 +166,13 @@ fn measure(
     for _ in 0..timing.rounds {
         for (settings, times) in all.iter().zip(&mut times) {
             for (scene, times) in scenes.iter().zip(times) {
-                let frames =
-                    studio.measure(&scene.shots(), scene.spacing_m, settings, timing.frames, timing.frames)?;
+                let frames = studio.measure(
+                    &scene.shots(),
+                    scene.spacing_m,
+                    settings,
+                    timing.frames,
+                    timing.frames,
+                )?;
                 times.extend(frames.iter().map(|f| f.frame_ms));
             }
             watch.step();

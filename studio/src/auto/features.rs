@@ -194,7 +194,8 @@ fn shown(places: &[(Vec3, Vec3, f64)], shot: &Shot, around: f64) -> [f64; 2] {
     for &(point, normal, area) in places.iter().step_by(stride) {
         let away = shot.camera.position - point;
         let to_camera = away.normalize_or_zero();
-        let weight = area * f64::from(normal.dot(to_camera)).max(0.0) / f64::from(away.length_squared()).max(1e-6);
+        let weight =
+            area * f64::from(normal.dot(to_camera)).max(0.0) / f64::from(away.length_squared()).max(1e-6);
         if weight <= 0.0 {
             continue;
         }

@@ -3,8 +3,10 @@
 //! ```text
 //! head --random_shots--> scenes --chart--> errors of choices \
 //!                            +--errors of random combinations--> Calibration
-//!                            +--times in two sizes /
+//!                            +--times in two sizes /             \--choices under bounds--> wider margins, until they are kept
 //! ```
+
+use std::collections::BTreeMap;
 
 use rubor_renderer::settings::{AntialiasMethod, Leaf, ScatterMethod, Settings};
 use rubor_rig::expression::Rig;
@@ -13,7 +15,7 @@ use rubor_rig::random::SplitMix64;
 
 use super::calibration::{Combined, Times};
 use super::shots::{calibrated, random_shots};
-use super::{Calibration, Features, Outline};
+use super::{Auto, Bound, Calibration, Features, Outline};
 use crate::error::{Failure, Outcome};
 use crate::measure::chart::{self, Effort, Group, Measure, RightLight, Scene, Suite, Timing, Truth, draw};
 use crate::report::ChartReport;
@@ -23,7 +25,13 @@ use crate::watch::Watch;
 /// Seed of the random shots.
 const SEED: u64 = 1;
 /// Random combinations of choices in a shot.
-const COMBINATIONS: usize = 8;
+const COMBINATIONS: usize = 6;
+/// Bounds of FLIP under which choices are tried, and the share of shots that has to keep them.
+const TRIED_BOUNDS: [f64; 3] = [0.01, 0.02, 0.04];
+const KEPT: f64 = 0.95;
+/// Factor by which margins grow until they are kept, and the number of times.
+const WIDER: f64 = 1.2;
+const MOST_TRIALS: usize = 10;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +79,13 @@ pub fn run(
     studio.set_heads([head])?;
     let untimed = chart::Options { timing: None, folder: None, light: false };
     let report = chart::run(studio, base, &scenes, &groups(base)?, &untimed, watch)?;
-    let combined = combined(studio, &scenes, &groups(base)?, base, watch)?;
+    let right = full_quality(base)?;
+    let truth = |scene: &Scene| Truth::draw(studio, scene, &right, Measure::Picture, base);
+    let truths: Vec<Truth> = scenes.iter().map(truth).collect::<Outcome<_>>()?;
+    let mut trials =
+        Trials { studio: &mut *studio, scenes: &scenes, truths: &truths, base, known: BTreeMap::new() };
+    let combined = trials.combined(&groups(base)?, watch)?;
+    let known = trials.known;
     let mut times = Vec::new();
     for size in [base.output.size, options.large] {
         let mut sized = base.clone();
@@ -85,39 +99,92 @@ pub fn run(
     let features: Vec<_> = scenes.iter().map(|s| outline.features(&s.shot, base.output.size)).collect();
     let calibration = Calibration::of(&report, &features, &times, &combined)
         .ok_or_else(|| Failure::job("the shots do not suffice for estimates").hint("more --shots"))?;
+    let mut trials = Trials { studio, scenes: &scenes, truths: &truths, base, known };
+    let calibration = trials.kept(calibration, &features, watch)?;
     Ok(Measured { calibration, features, report })
 }
 
-/// Draws random combinations of choices in scenes and measures how far they are from full quality.
-fn combined(
-    studio: &mut Studio,
-    scenes: &[Scene],
-    groups: &[Group],
-    base: &Settings,
-    watch: &mut dyn Watch,
-) -> Outcome<Vec<Combined>> {
-    let mut random = SplitMix64(SEED);
-    let mut all = Vec::new();
-    let right = full_quality(base)?;
-    watch.begin("combinations", scenes.len() as u64);
-    for (shot, scene) in scenes.iter().enumerate() {
-        let truth = Truth::draw(studio, scene, &right, Measure::Picture, base)?;
-        for _ in 0..COMBINATIONS {
-            let choices: Vec<usize> = groups.iter().map(|g| random.below(g.choices.len())).collect();
-            let mut settings = base.clone();
-            for (group, choice) in groups.iter().zip(&choices) {
-                let (_, chosen) = &group.choices[*choice];
-                if let (Some(leaf), Ok(all)) = (Leaf::of_flag(&group.flag), serde_json::to_value(chosen)) {
-                    settings.overlay(&leaf.change(leaf.value_in(&all)))?;
+/// Combinations of choices that are drawn in scenes and compared with full quality.
+struct Trials<'a> {
+    studio: &'a mut Studio,
+    scenes: &'a [Scene],
+    truths: &'a [Truth],
+    base: &'a Settings,
+    /// Mean FLIP and relative RMSE by scene and choices.
+    known: BTreeMap<(usize, Vec<usize>), [f64; 2]>,
+}
+
+impl Trials<'_> {
+    /// Errors of choices in a scene.
+    fn errors(&mut self, shot: usize, choices: &[usize], settings: &Settings) -> Outcome<[f64; 2]> {
+        if let Some(known) = self.known.get(&(shot, choices.to_vec())) {
+            return Ok(*known);
+        }
+        let (error, _) = self.truths[shot].error(&draw(self.studio, &self.scenes[shot], settings, false)?);
+        let errors = [error.flip_mean, error.relative_rmse];
+        self.known.insert((shot, choices.to_vec()), errors);
+        Ok(errors)
+    }
+
+    /// Random combinations in every scene.
+    fn combined(&mut self, groups: &[Group], watch: &mut dyn Watch) -> Outcome<Vec<Combined>> {
+        let mut random = SplitMix64(SEED);
+        let mut all = Vec::new();
+        watch.begin("combinations", self.scenes.len() as u64);
+        for shot in 0..self.scenes.len() {
+            for _ in 0..COMBINATIONS {
+                let choices: Vec<usize> = groups.iter().map(|g| random.below(g.choices.len())).collect();
+                let mut settings = self.base.clone();
+                for (group, choice) in groups.iter().zip(&choices) {
+                    let (_, chosen) = &group.choices[*choice];
+                    if let (Some(leaf), Ok(all)) = (Leaf::of_flag(&group.flag), serde_json::to_value(chosen))
+                    {
+                        settings.overlay(&leaf.change(leaf.value_in(&all)))?;
+                    }
+                }
+                let errors = self.errors(shot, &choices, &settings)?;
+                all.push(Combined { shot, choices, errors });
+            }
+            watch.step();
+        }
+        watch.end();
+        Ok(all)
+    }
+
+    /// Widens margins until what is chosen under bounds keeps them: the cheapest of many choices is one whose error is estimated too low
+    /// more often than any choice is.
+    fn kept(
+        &mut self,
+        calibration: Calibration,
+        features: &[Features],
+        watch: &mut dyn Watch,
+    ) -> Outcome<Calibration> {
+        let size = self.base.output.size;
+        let mut auto = Auto { bound: Bound::Flip(1.0), held: Vec::new(), calibration };
+        for _ in 0..MOST_TRIALS {
+            let (mut chosen, mut kept) = (0usize, 0usize);
+            watch.begin("choices under bounds", (TRIED_BOUNDS.len() * self.scenes.len()) as u64);
+            for (shot, f) in features.iter().enumerate() {
+                for most in TRIED_BOUNDS {
+                    auto.bound = Bound::Flip(most);
+                    let found = auto.choose(&[*f], size, None);
+                    let choices: Vec<usize> = found.choices.iter().filter_map(|c| *c).collect();
+                    if found.is_kept {
+                        let settings = auto.settings(self.base, &found)?;
+                        chosen += 1;
+                        kept += usize::from(self.errors(shot, &choices, &settings)?[0] <= most);
+                    }
+                    watch.step();
                 }
             }
-            let (error, _) = truth.error(&draw(studio, scene, &settings, false)?);
-            all.push(Combined { shot, choices, errors: [error.flip_mean, error.relative_rmse] });
+            watch.end();
+            if kept as f64 >= KEPT * chosen as f64 {
+                break;
+            }
+            auto.calibration = auto.calibration.widened(WIDER);
         }
-        watch.step();
+        Ok(auto.calibration)
     }
-    watch.end();
-    Ok(all)
 }
 
 /// What combinations of choices are compared with: the last choice of each, and more taps and samples than any of them.

@@ -170,7 +170,8 @@ pub fn frames_of(
         let seconds = f64::from(i) * sequence.duration / f64::from(count.max(1));
         let name = format!("{}-{seconds:.2}", first.name);
         let later = |head: usize| {
-            evaluator.at((seconds + head as f64 * sequence.duration / heads as f64) % sequence.duration.max(1e-9))
+            evaluator
+                .at((seconds + head as f64 * sequence.duration / heads as f64) % sequence.duration.max(1e-9))
         };
         let mut shots: Vec<Shot> = (0..heads.max(1)).map(later).collect();
         plan::step_back(&mut shots);

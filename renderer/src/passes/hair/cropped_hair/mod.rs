@@ -94,9 +94,9 @@ impl CroppedHair {
         Self {
             light: Kernel::new(gpu, "light hairs", &lighting, "light_hairs"),
             kernels: Blended::new(gpu, rasteriser, "cropped hair", program(), entries),
-            cover: rasteriser.stores_depth().then(|| {
-                Kernel::new(gpu, "cover hairs", &lighting.flag("tests_depth", true), "cover_hairs")
-            }),
+            cover: rasteriser
+                .stores_depth()
+                .then(|| Kernel::new(gpu, "cover hairs", &lighting.flag("tests_depth", true), "cover_hairs")),
             sums: gpu.storage_zeroed("sums of hairs", 0),
         }
     }

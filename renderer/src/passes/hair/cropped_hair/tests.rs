@@ -217,7 +217,12 @@ fn hairs_come_one_by_one_and_all_are_drawn_near_by() {
 }
 
 /// The dome with hairs, from so far that a pixel is so many metres wide, by raster units and by sums.
-fn both_ways(renderer: &mut Renderer, (rest, head): (&Head, &HeadOnGpu), pixel_metres: f32, fov_degrees: f32) -> [Vec<[f32; 4]>; 2] {
+fn both_ways(
+    renderer: &mut Renderer,
+    (rest, head): (&Head, &HeadOnGpu),
+    pixel_metres: f32,
+    fov_degrees: f32,
+) -> [Vec<[f32; 4]>; 2] {
     let size = 160;
     let distance = 0.5 * size as f32 * pixel_metres / (0.5 * fov_degrees.to_radians()).tan();
     let state = FaceState { head_rotation: Quat::from_rotation_x(0.5), ..FaceState::neutral(rest) };
@@ -256,7 +261,8 @@ fn a_summed_hair_covers_the_pixels_of_its_triangle() {
     let [without, _] = both_ways(&mut renderer, (&head, &bald), 0.0006, 5.0);
     let [blended, summed] = both_ways(&mut renderer, (&head, &haired), 0.0006, 5.0);
     let apart = |a: &[f32; 4], b: &[f32; 4]| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max);
-    let of_hair: Vec<usize> = (0..blended.len()).filter(|i| apart(&blended[*i], &without[*i]) > 0.005).collect();
+    let of_hair: Vec<usize> =
+        (0..blended.len()).filter(|i| apart(&blended[*i], &without[*i]) > 0.005).collect();
     assert!(of_hair.len() > 200, "{} pixels of {few} hairs", of_hair.len());
     let differ = of_hair.iter().filter(|i| apart(&blended[**i], &summed[**i]) > 0.01).count();
     // Corners of the raster units are rounded, and some pixels do hold two hairs.
@@ -279,8 +285,9 @@ fn sums_of_dense_hair_are_what_its_layers_show() {
         assert_eq!(blended, again);
         let blocks = |picture: &[[f32; 4]]| -> Vec<f64> {
             let at = |x: usize, y: usize| f64::from(picture[y * 160 + x][1]);
-            let block =
-                |b: usize| (0..64).map(|i| at(8 * (b % 20) + i % 8, 8 * (b / 20) + i / 8)).sum::<f64>() / 64.0;
+            let block = |b: usize| {
+                (0..64).map(|i| at(8 * (b % 20) + i % 8, 8 * (b / 20) + i / 8)).sum::<f64>() / 64.0
+            };
             (0..400).map(block).collect()
         };
         let (a, b) = (blocks(&blended), blocks(&summed));

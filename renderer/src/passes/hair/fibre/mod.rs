@@ -64,6 +64,7 @@ pub(crate) struct HairLight {
 /// Samplers and the stand-in texture with which hair shaders read the light of a scene.
 pub(crate) struct Fibre {
     compare: wgpu::Sampler,
+    linear_clamp: wgpu::Sampler,
     trilinear_repeat: wgpu::Sampler,
     black: wgpu::TextureView,
 }
@@ -79,6 +80,10 @@ impl Fibre {
             compare: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("hair: shadow"),
                 compare: Some(wgpu::CompareFunction::LessEqual),
+                ..linear.clone()
+            }),
+            linear_clamp: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("hair: linear clamp"),
                 ..linear.clone()
             }),
             trilinear_repeat: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
@@ -109,11 +114,12 @@ impl Fibre {
         &'a self,
         params: &'a wgpu::Buffer,
         light: &'a Illumination<'_>,
-    ) -> [Resource<'a>; 5] {
+    ) -> [Resource<'a>; 6] {
         [
             ("hair_light", params.bound()),
             ("hair_shadows", light.shadows.bound()),
             ("hair_compare", self.compare.bound()),
+            ("hair_shadow_sampler", self.linear_clamp.bound()),
             ("hair_sky", light.environment.map_or(&self.black, |e| &e.filtered).bound()),
             ("hair_sky_sampler", self.trilinear_repeat.bound()),
         ]
