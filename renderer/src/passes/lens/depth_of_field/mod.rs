@@ -28,7 +28,8 @@
 //! Costs: a read of depth, a write and a third of the picture, then [`crate::settings::DepthOfFieldMethod`]'s taps for tiles that a
 //! blur of more than half a pixel reaches; the others are copied.
 
-pub(crate) mod reference;
+#[cfg(test)]
+mod reference;
 #[cfg(test)]
 mod tests;
 

@@ -117,12 +117,13 @@ fn a_bright_point_keeps_its_energy() {
             let sum: f64 = found.iter().map(|f| f[c]).sum();
             assert!((sum / lit - 1.0).abs() < 0.01, "radius {radius}: {sum} of {lit}");
         }
-        // Nothing outside of the disk.
-        let outside = found.iter().enumerate().filter(|(i, f)| {
+        // Levels are as coarse as a third of the disk; hardly anything comes outside of it.
+        let is_outside = |i: usize| {
             let off = ((i % 127) as f64 - 63.0).hypot((i / 127) as f64 - 56.0);
-            off > f64::from(radius.abs()) * 1.3 + 2.0 && f[0] > 1.0
-        });
-        assert_eq!(outside.count(), 0, "radius {radius}");
+            off > f64::from(radius.abs()) * 1.3 + 2.0
+        };
+        let outside: f64 = found.iter().enumerate().filter(|(i, _)| is_outside(*i)).map(|(_, f)| f[0]).sum();
+        assert!(outside < 0.005 * 8000.0, "radius {radius}: {outside} of 8000");
     }
 }
 

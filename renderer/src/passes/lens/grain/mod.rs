@@ -28,6 +28,7 @@
 //! Costs: a hash and a load for each pixel, nine hashes where grains are larger than a pixel; the picture before it has half
 //! floats in place of bytes.
 
+#[cfg(test)]
 mod reference;
 #[cfg(test)]
 mod tests;
