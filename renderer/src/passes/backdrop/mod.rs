@@ -10,7 +10,8 @@
 //! picture. [`BackdropMethod::Environment`] is a coarse level of the surroundings, as a lens with a wide aperture sees them.
 //!
 //! A head ends at a cut through neck, shoulders or chest. With `fade` its light goes over into the backdrop towards the lower end,
-//! by height in the head's own space (smoothstep), and its coverage with it.
+//! by height in the head's own space (smoothstep), and its coverage with it. Up to twice that height it does so towards the sides
+//! of its box too, where shoulders are cut off.
 //!
 //! Does not: light the head or take its shadow; fade hairs, films and blended parts.
 //!
@@ -61,7 +62,16 @@ pub(crate) struct Params {
     pub(crate) kind: u32,
     pub(crate) level: f32,
     pub(crate) intensity: f32,
-    pub(crate) fade: [[f32; 4]; HEADS],
+    pub(crate) fade: [Fade; HEADS],
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct Fade {
+    pub(crate) up: [f32; 4],
+    pub(crate) side: [f32; 4],
+    pub(crate) half_width: f32,
+    pub(crate) padding: [u32; 3],
 }
 
 /// Whether a look needs the pass.
@@ -69,13 +79,25 @@ pub(crate) fn is_needed(look: &Look) -> bool {
     look.backdrop != BackdropMethod::Plain || look.backdrop_light != 1.0 || look.fade > 0.0
 }
 
-/// 0 at the lower end of a head and 1 at a height above it, as a plane of world space: xyz gradient, w offset.
-fn fade_plane(world_from_head: &Mat4, lower_end: f32, height: f32) -> Vec4 {
-    if height <= 0.0 {
-        return Vec4::W;
+impl Fade {
+    /// Nothing fades.
+    const OFF: Self = Self { up: [0.0, 0.0, 0.0, 1.0], side: [0.0; 4], half_width: 1.0, padding: [0; 3] };
+
+    /// Of a head with a box, over a height in metres.
+    fn new(world_from_head: &Mat4, (low, high): (Vec3, Vec3), height: f32) -> Self {
+        if height <= 0.0 {
+            return Self::OFF;
+        }
+        let rows = world_from_head.inverse().transpose();
+        let up = (rows * Vec4::Y - Vec4::W * low.y) / height;
+        let side = (rows * Vec4::X - Vec4::W * (0.5 * (low.x + high.x))) / height;
+        Self {
+            up: up.to_array(),
+            side: side.to_array(),
+            half_width: 0.5 * (high.x - low.x) / height,
+            padding: [0; 3],
+        }
     }
-    let up = world_from_head.inverse().transpose() * Vec4::Y;
-    (up - Vec4::W * lower_end) / height
 }
 
 impl Params {
@@ -84,10 +106,9 @@ impl Params {
         let view_from_world = scene.camera.view_from_world();
         let subject = view_from_world.transform_point3(optics.subject);
         let height = optics.subject_height;
-        let mut fade = [Vec4::W.to_array(); HEADS];
-        for (plane, head) in fade.iter_mut().zip(heads) {
-            let lower_end = head.head.bounds.0.y;
-            *plane = fade_plane(&head.world_from_head, lower_end, 1e-3 * look.fade).to_array();
+        let mut fade = [Fade::OFF; HEADS];
+        for (fade, head) in fade.iter_mut().zip(heads) {
+            *fade = Fade::new(&head.world_from_head, head.head.bounds, 1e-3 * look.fade);
         }
         Self {
             color: (look.backdrop_light * scene.background_linear).extend(0.0).to_array(),

@@ -85,15 +85,36 @@ fn without_surroundings_the_wall_stays_plain() {
     }
 }
 
+/// As the shader has it.
+fn wholeness(fade: &Fade, place: Vec3) -> f32 {
+    let at = |row: [f32; 4]| Vec4::from(row).dot(place.extend(1.0));
+    let (above, inside) = (at(fade.up), fade.half_width - at(fade.side).abs());
+    above.min(inside.max(above - 1.0)).clamp(0.0, 1.0)
+}
+
 #[test]
-fn heads_fade_by_height_in_their_own_space() {
+fn heads_fade_towards_their_lower_end_and_shoulders_to_the_sides() {
     let place = Mat4::from_rotation_translation(glam::Quat::from_rotation_z(0.5), Vec3::new(0.1, 0.2, 0.3));
-    let plane = fade_plane(&place, -0.15, 0.05);
-    for (height, expected) in [(-0.15, 0.0), (-0.125, 0.5), (-0.10, 1.0), (0.0, 3.0)] {
-        let p = place.transform_point3(Vec3::new(0.03, height, -0.02));
-        assert!((plane.dot(p.extend(1.0)) - expected).abs() < 1e-5, "{height}");
+    let bounds = (Vec3::new(-0.18, -0.15, -0.1), Vec3::new(0.14, 0.1, 0.1));
+    let fade = Fade::new(&place, bounds, 0.05);
+    // Distance to the right of the middle, height, share of the head.
+    let cases = [
+        (0.0, -0.15, 0.0),
+        (0.0, -0.125, 0.5),
+        (0.0, -0.10, 1.0),
+        (0.16, -0.11, 0.0),
+        (-0.135, -0.11, 0.5),
+        (0.16, -0.075, 0.5),
+        // Ears are as wide as they like.
+        (0.16, -0.05, 1.0),
+        (0.0, 0.05, 1.0),
+    ];
+    for (x, y, expected) in cases {
+        let p = place.transform_point3(Vec3::new(x - 0.02, y, -0.02));
+        let found = wholeness(&fade, p);
+        assert!((found - expected).abs() < 1e-4, "{x} {y}: {found}, expected {expected}");
     }
-    assert_eq!(fade_plane(&place, -0.15, 0.0).dot(Vec4::W), 1.0, "off is whole everywhere");
+    assert_eq!(wholeness(&Fade::new(&place, bounds, 0.0), Vec3::splat(-9.0)), 1.0, "off is whole everywhere");
 }
 
 #[test]

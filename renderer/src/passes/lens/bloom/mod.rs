@@ -11,7 +11,8 @@
 //! `(1 - w) light + w spread`, so no light is made or lost.
 //!
 //! Differs from the source: the spread is a pyramid of nearly Gaussian levels ([`fit`] has their shares) in place of a convolution with the
-//! function itself. The share of light within a radius is off by less than 2 % from 10 pixels on.
+//! function itself. The share of light within a radius is off by at most 5 % of all light from 16 pixels on (2.6 % where
+//! a level's width suits the radius), as a sum of Gaussians ends more slowly than a function that is zero from R on.
 //!
 //! Does not: bring light in from outside of the picture (the border is repeated, so a flat field stays flat and what a bright
 //! place at the border would spread outwards stays in); make streaks of aperture blades.
