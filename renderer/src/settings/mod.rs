@@ -165,7 +165,7 @@ pub struct Look {
     /// Factor of the light of the backdrop
     #[schemars(range(min = 0, max = 1000))]
     pub backdrop_light: f32,
-    /// Millimetres above the lower end of a head over which it fades into the backdrop
+    /// Millimetres above the lower end of a head, and beside the cut of its shoulders, over which it fades into the backdrop
     #[schemars(range(min = 0, max = 500))]
     pub fade: f32,
 }
