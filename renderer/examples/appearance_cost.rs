@@ -55,6 +55,7 @@ fn cost(renderer: &mut Renderer, distributions: usize, zones: usize) -> Result<[
         environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let settings = Settings {
         output: Output { size: [16, 16], ..Output::default() },

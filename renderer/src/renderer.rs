@@ -585,6 +585,16 @@ fn check_scene(scene: &Scene<'_>) -> Result<(), RenderError> {
         let expected = "a finite position and a target apart from it".into();
         return limit("camera", format!("{} looking at {}", c.position, c.target), expected);
     }
+    let optics = &scene.optics;
+    let lens = [optics.sensor_height_mm, optics.f_stop.unwrap_or(1.0), optics.focus_metres];
+    if !(lens.iter().all(|v| v.is_finite() && *v > 0.0)) {
+        let found = format!("sensor {} mm, f-stop {:?}, focus {} m", lens[0], optics.f_stop, lens[2]);
+        return limit("lens", found, "lengths and an f-stop above 0".into());
+    }
+    if !(optics.subject.is_finite() && optics.subject_height > 0.0 && optics.subject_height.is_finite()) {
+        let found = format!("{} tall at {}", optics.subject_height, optics.subject);
+        return limit("subject of the backdrop", found, "a place and a height above 0, metres".into());
+    }
     if !scene.environment_rotation.is_finite() {
         let expected = "a finite angle".into();
         return limit("rotation of the environment", scene.environment_rotation.to_string(), expected);

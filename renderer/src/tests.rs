@@ -12,7 +12,7 @@ use crate::channels::{CHANNELS, Channel, ChannelData};
 use crate::device::native;
 use crate::passes::geometry::{morph, shadow, surface_data, tangent_frames, velocity, visibility};
 use crate::passes::hair::overlay;
-use crate::passes::{appearance, compose, display, resolve, see_through, shade};
+use crate::passes::{appearance, compose, resolve, see_through, shade};
 use crate::scene::authored::{GpuAuthoredVertex, GpuMaterial, GpuTexture};
 use crate::scene::head::GpuVertex;
 use crate::scene::lamp::GpuLight;
@@ -46,7 +46,6 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
         assert_workgroups(&compose::program(hair), &square("compose"));
     }
     for tone_map in ToneMap::all() {
-        assert_workgroups(&display::program(tone_map), &square("display"));
         assert_workgroups(&resolve::program(tone_map), &square("resolve_samples"));
     }
     assert_workgroups(&velocity::program(), &square("screen_velocity"));
@@ -147,13 +146,6 @@ fn structs_are_laid_out_alike_on_both_sides() {
         "Params",
         size_of::<overlay::Params>(),
         &offsets!(overlay::Params; ambient as "ambient", first as "first", hair as "hair"),
-    );
-    assert_layout(
-        &display::program(ToneMap::Filmic),
-        "display",
-        "Params",
-        size_of::<display::Params>(),
-        &offsets!(display::Params; exposure as "exposure"),
     );
     assert_layout(
         &resolve::program(ToneMap::Filmic),
@@ -300,6 +292,7 @@ pub(crate) fn draw(
         environment_rotation: 0.0,
         environment_intensity: 0.5,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     Ok(render(renderer, &scene, settings)?.0)
 }
@@ -546,6 +539,7 @@ fn several_heads_of_one_frame_keep_apart() {
         environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let image = render(&mut renderer, &scene, &settings([64, 32])).expect("it draws").0;
     let lit = |x: usize, y: usize| image.rgba[4 * (y * 64 + x) + 1] > 40;
@@ -621,6 +615,7 @@ fn velocity_is_the_motion(renderer: &mut Renderer, head: &Head, on_gpu: &HeadOnG
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         render(renderer, &scene, &settings).expect("it draws");
         points.push(read_vectors(renderer, Channel::Positions));
@@ -673,6 +668,7 @@ fn a_frame_goes_into_commands_and_a_texture_of_somebody_else() {
         environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::splat(0.1),
+        optics: Default::default(),
     };
     let texture =
         |format, usage| gpu.target("given", [51, 27], format, usage | wgpu::TextureUsages::COPY_SRC);
@@ -721,6 +717,7 @@ fn a_frame_can_be_drawn_while_the_one_before_is_read() {
                 environment_rotation: 0.0,
                 environment_intensity: 0.0,
                 background_linear: Vec3::ZERO,
+                optics: Default::default(),
             };
             waiting.push(renderer.draw(&scene, &settings).expect("it draws"));
             while waiting.len() > 2 * usize::from(overlaps) {
@@ -771,6 +768,7 @@ fn windows_hold_all_pixels_of_their_heads() {
         environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let size = [96, 64];
     render(&mut renderer, &scene, &settings(size)).expect("it draws");

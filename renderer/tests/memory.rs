@@ -98,6 +98,7 @@ fn memory_stays_flat_over_frames() {
                 environment_rotation: t,
                 environment_intensity: 0.5,
                 background_linear: Vec3::ZERO,
+                optics: Default::default(),
             };
             native::wait(&gpu, renderer.render(&scene, &settings)).expect("it draws");
         };

@@ -11,9 +11,12 @@
 //! assert!(!notes.is_empty()); // this head lacks nearly everything
 //! ```
 
+use std::collections::BTreeMap;
+
 use glam::{EulerRot, Quat, Vec3};
 
 use crate::bind::{Binder, BoundRig, Limits, Weights};
+use crate::camera::LensState;
 use crate::error::{Note, RigError};
 use crate::expression::Rig;
 use crate::face_state::FaceState;
@@ -29,6 +32,10 @@ use crate::timeline::{LightKind, Sequence, Track};
 pub struct Shot {
     /// Seconds from the start.
     pub time_s: f64,
+    /// Number of the frame that is nearest to the time, from 0: film grain follows it.
+    pub frame: u32,
+    /// Where the face of the head at rest is.
+    pub place: FaceFrame,
     /// The face.
     pub face: FaceState,
     /// The camera.
@@ -50,6 +57,8 @@ pub struct CameraState {
     pub up: Vec3,
     /// Vertical field of view, radians.
     pub fov_y: f32,
+    /// Aperture and focus.
+    pub lens: LensState,
 }
 
 /// One light.
@@ -89,6 +98,7 @@ pub struct Evaluator {
     rig: BoundRig,
     sequence: Sequence,
     frame: FaceFrame,
+    landmarks: BTreeMap<String, Vec3>,
     expressions: Vec<(usize, Track<f32>)>,
     states: Vec<(usize, Track<f32>)>,
     shapes: Vec<(Vec<Target>, Track<f32>)>,
@@ -156,6 +166,7 @@ impl Evaluator {
             }
         }
         notes.append(&mut binder.notes);
+        notes.append(&mut sequence.check_focus(&head.landmarks)?);
         let mut living = Vec::new();
         if sequence.eyes.is_some() || sequence.life.is_some() {
             // A head without these shapes keeps still. The sequence is not at fault, so there is no note.
@@ -188,6 +199,7 @@ impl Evaluator {
             rig: bound,
             sequence: sequence.clone(),
             frame: FaceFrame::of(head),
+            landmarks: head.landmarks.clone(),
             expressions,
             states,
             shapes,
@@ -224,10 +236,13 @@ impl Evaluator {
             intensity: environment.intensity.at(time_s),
             rotation_y: radians(&environment.rotation_degrees),
         });
+        let face = self.face_at(time_s);
         Shot {
             time_s,
-            face: self.face_at(time_s),
-            camera: self.camera(time_s),
+            frame: (time_s * self.sequence.fps).round().max(0.0) as u32,
+            place: self.frame,
+            camera: self.camera(time_s, &face),
+            face,
             lights: self.lights(time_s),
             environment,
         }
@@ -292,11 +307,10 @@ impl Evaluator {
         }
     }
 
-    fn camera(&self, time_s: f64) -> CameraState {
+    fn camera(&self, time_s: f64, face: &FaceState) -> CameraState {
         let camera = &self.sequence.camera;
         let aspect = self.sequence.size.map_or(1.0, |[width, height]| width as f32 / height as f32);
-        let fov_y = camera.fov_degrees.as_ref().map(|track| track.at(time_s).to_radians());
-        let mut state = self.frame.camera(camera.framing, fov_y, aspect);
+        let mut state = self.frame.camera(camera.framing, camera.fov_y(time_s), aspect);
         if let Some(target) = &camera.target {
             state.target = self.frame.origin + Vec3::from(target.at(time_s));
         }
@@ -311,6 +325,7 @@ impl Evaluator {
         let turned = Quat::from_euler(EulerRot::YXZ, orbit, -elevation, 0.0) * away;
         state.position = state.target + turned;
         state.up = if turned.normalize().y.abs() > 0.999 { Vec3::NEG_Z } else { Vec3::Y };
+        state.lens = camera.lens(time_s, &state, face, &self.landmarks, self.frame.origin);
         state
     }
 

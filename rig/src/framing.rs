@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::camera::LensState;
 use crate::evaluate::CameraState;
 use crate::head::Head;
 use crate::timeline::Framing;
@@ -56,6 +57,12 @@ impl FaceFrame {
         let widen = (LEAST_ASPECT / aspect).max(1.0);
         let distance = 0.5 * height * self.head_height * widen / (0.5 * fov_y).tan();
         let target = self.origin - Vec3::Y * (below * self.head_height);
-        CameraState { position: target + Vec3::Z * distance, target, up: Vec3::Y, fov_y }
+        CameraState {
+            position: target + Vec3::Z * distance,
+            target,
+            up: Vec3::Y,
+            fov_y,
+            lens: LensState::default(),
+        }
     }
 }

@@ -24,6 +24,7 @@ pub mod atlas;
 pub mod authored;
 pub mod bind;
 pub mod bvh;
+pub mod camera;
 pub mod color;
 pub mod deform;
 pub mod error;

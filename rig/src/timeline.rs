@@ -26,6 +26,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize};
 
+pub use crate::camera::{Camera, Focus, FocusPoint, Framing};
 use crate::error::RigError;
 use crate::json::{self, Source, Step, steps};
 use crate::life::{Eyes, Life};
@@ -122,43 +123,6 @@ pub struct Capture {
     /// Only the part between two times of the recording, seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trim: Option<[f64; 2]>,
-}
-
-/// Camera. `position`, `target` and `fovDegrees` each replace what the framing gives.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct Camera {
-    /// How much of the character is seen.
-    #[serde(default)]
-    pub framing: Framing,
-    /// Metres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub position: Option<Track<[f32; 3]>>,
-    /// Point in the middle of the picture, metres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub target: Option<Track<[f32; 3]>>,
-    /// Vertical field of view, 1 to 170 degrees.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub fov_degrees: Option<Track<f32>>,
-    /// Moves the camera around its target: positive shows the character's left side.
-    #[serde(default)]
-    pub orbit_degrees: Track<f32>,
-    /// Raises the camera around its target, -89 to 89.
-    #[serde(default)]
-    pub elevation_degrees: Track<f32>,
-}
-
-/// A picture in a photographer's terms, scaled to the size of the head.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "camelCase")]
-pub enum Framing {
-    /// From brows to chin.
-    Close,
-    /// The head with some air.
-    #[default]
-    Head,
-    /// Head and shoulders.
-    Bust,
 }
 
 /// A light. Which fields it needs depends on its kind.
@@ -643,6 +607,7 @@ impl Sequence {
         self.check_optional(&steps!["camera", "position"], camera.position.as_ref(), any)?;
         self.check_optional(&steps!["camera", "target"], camera.target.as_ref(), any)?;
         self.check_optional(&steps!["camera", "fovDegrees"], camera.fov_degrees.as_ref(), (1.0, 170.0))?;
+        self.check_lens()?;
         self.check_track(&steps!["camera", "orbitDegrees"], &camera.orbit_degrees, any)?;
         self.check_track(&steps!["camera", "elevationDegrees"], &camera.elevation_degrees, (-89.0, 89.0))?;
         for (i, light) in self.lights.iter().enumerate() {
@@ -716,7 +681,7 @@ impl Sequence {
         self.check_track(&steps!["life", "sway"], &life.sway, factor)
     }
 
-    fn check_optional<T: TrackValue>(
+    pub(crate) fn check_optional<T: TrackValue>(
         &self,
         at: &[Step],
         track: Option<&Track<T>>,
@@ -725,7 +690,7 @@ impl Sequence {
         track.map_or(Ok(()), |track| self.check_track(at, track, range))
     }
 
-    fn check_track<T: TrackValue>(
+    pub(crate) fn check_track<T: TrackValue>(
         &self,
         at: &[Step],
         track: &Track<T>,
@@ -769,7 +734,7 @@ impl Sequence {
         Ok(())
     }
 
-    fn wrong<T>(&self, path: &[Step], found: &str, expected: &str) -> Result<T, RigError> {
+    pub(crate) fn wrong<T>(&self, path: &[Step], found: &str, expected: &str) -> Result<T, RigError> {
         Err(RigError {
             place: self.source.place_of_value(path),
             found: found.to_owned(),

@@ -49,6 +49,7 @@ pub mod gallery;
 pub mod inputs;
 pub mod job;
 pub mod layers;
+pub mod looks;
 pub mod manifest;
 pub mod measure;
 pub mod notes;

@@ -247,6 +247,9 @@ pub fn spacing_m<'a>(heads: impl IntoIterator<Item = &'a Head>) -> f32 {
 pub fn step_back(shots: &mut [Shot]) {
     let n = shots.len() as f32;
     if let Some(Shot { camera, .. }) = shots.first_mut() {
-        camera.position = camera.target + (camera.position - camera.target) * n;
+        let away = camera.position - camera.target;
+        camera.position = camera.target + away * n;
+        // What was in focus stays so.
+        camera.lens.focus_metres += away.length() * (n - 1.0);
     }
 }

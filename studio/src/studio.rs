@@ -17,7 +17,7 @@ use rubor_renderer::channels::ChannelData;
 use rubor_renderer::settings::{RasterMethod, Settings};
 use rubor_renderer::{
     AdapterDescription, Camera, ColorTable, Environment, FrameStats, FrameTimes, Gpu, HeadInstance,
-    HeadOnGpu, Image, Ladder, Light, LightKind, Renderer, Scene, native,
+    HeadOnGpu, Image, Ladder, Light, LightKind, Optics, Renderer, Scene, native,
 };
 use rubor_rig::authored::Authored;
 use rubor_rig::evaluate::{LightState, Shot};
@@ -296,6 +296,7 @@ impl Studio {
             environment_rotation: first.environment.as_ref().map_or(0.0, |e| e.rotation_y),
             environment_intensity: first.environment.as_ref().map_or(0.0, |e| e.intensity),
             background_linear: BACKDROP_LINEAR,
+            optics: optics(first),
         };
         draw(&mut self.renderer, &scene)
     }
@@ -332,6 +333,19 @@ fn ladder(head: &Head) -> Ladder {
         provenance: Vec::new(),
     };
     Ladder::new(Arc::new(geometry), levels::levels, levels::least_error_metres(head))
+}
+
+/// The lens of a shot and where its backdrop is lit.
+fn optics(shot: &Shot) -> Optics {
+    let lens = shot.camera.lens;
+    Optics {
+        frame: shot.frame,
+        sensor_height_mm: lens.sensor_height_mm,
+        f_stop: lens.f_stop,
+        focus_metres: lens.focus_metres,
+        subject: shot.place.origin,
+        subject_height: shot.place.head_height,
+    }
 }
 
 fn light(state: &LightState) -> Light {

@@ -14,6 +14,7 @@ use rubor_renderer::channels::Channel;
 use rubor_renderer::settings::{AntialiasMethod, Output, Quality, ScatterMethod, Settings, TransmitMethod};
 use rubor_rig::evaluate::{CameraState, EnvironmentState, LightState, Shot};
 use rubor_rig::face_state::FaceState;
+use rubor_rig::framing::FaceFrame;
 use rubor_rig::timeline::LightKind;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -49,7 +50,7 @@ fn settings(antialias: AntialiasMethod) -> Settings {
 }
 
 fn camera(position: Vec3, target: Vec3) -> CameraState {
-    CameraState { position, target, up: Vec3::Y, fov_y: 24f32.to_radians() }
+    CameraState { position, target, up: Vec3::Y, fov_y: 24f32.to_radians(), lens: Default::default() }
 }
 
 /// Light of each pixel.
@@ -136,6 +137,8 @@ impl Stage {
         let environment = EnvironmentState { name: "studio".into(), intensity: 0.6, rotation_y: 0.0 };
         let shot = Shot {
             time_s: 0.0,
+            frame: 0,
+            place: FaceFrame { origin: Vec3::ZERO, head_height: 0.23 },
             face: state.clone(),
             camera,
             lights: vec![key],

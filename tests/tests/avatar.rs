@@ -116,6 +116,7 @@ fn draw(renderer: &mut Renderer, head: &Head, blush: f32, with_sky: bool) -> Vec
         environment_rotation: 0.0,
         environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let settings = Settings {
         output: Output {

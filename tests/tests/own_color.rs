@@ -98,6 +98,7 @@ fn draw(renderer: &mut Renderer, head: &Head, channel: Channel) -> Vec<[f32; 4]>
         environment_rotation: 0.0,
         environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let settings = Settings {
         output: Output {

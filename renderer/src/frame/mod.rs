@@ -17,9 +17,10 @@ use crate::device::{Gpu, Image};
 use crate::error::RenderError;
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::Appearance;
+use crate::passes::backdrop::{self, Backdrop};
 use crate::passes::compose::Compose;
 use crate::passes::diffusion::Needs;
-use crate::passes::display::Display;
+use crate::passes::display::{Display, Flavour};
 use crate::passes::geometry::morph::Morph;
 use crate::passes::geometry::raster::Rasteriser;
 use crate::passes::geometry::shadow::Shadow;
@@ -30,11 +31,14 @@ use crate::passes::geometry::visibility::Visibility;
 use crate::passes::hair::cropped_hair::CroppedHair;
 use crate::passes::hair::fibre::Fibre;
 use crate::passes::hair::overlay::Overlay;
+use crate::passes::lens::bloom::Bloom;
+use crate::passes::lens::depth_of_field::DepthOfField;
+use crate::passes::lens::grain::Grain;
 use crate::passes::resolve::Resolve;
 use crate::passes::see_through::SeeThrough;
 use crate::passes::shade::{Shade, Transmittance};
 use crate::scene::{Light, MAX_LIGHTS, PosedHead, Scene};
-use crate::settings::{Settings, ToneMap, TransmitMethod};
+use crate::settings::{DepthOfFieldMethod, Look, Settings, ToneMap, TransmitMethod};
 
 /// The passes of frames, with their pipelines.
 pub(crate) struct Passes {
@@ -54,6 +58,13 @@ pub(crate) struct Passes {
     pub(crate) tone_map: ToneMap,
     pub(crate) resolve: Resolve,
     pub(crate) display: Display,
+    /// Each present if the look or the lens asks for it.
+    pub(crate) backdrop: Option<Backdrop>,
+    pub(crate) depth_of_field: Option<DepthOfField>,
+    pub(crate) bloom: Option<Bloom>,
+    pub(crate) grain: Option<Grain>,
+    /// Format of what `antialias` writes.
+    antialias_format: wgpu::TextureFormat,
     /// Present if the settings ask for it.
     pub(crate) antialias: Option<Antialias>,
     pub(crate) transmittance: Option<(Arc<Profile>, Transmittance)>,
@@ -109,7 +120,12 @@ impl Passes {
             see_through: SeeThrough::default(),
             tone_map,
             resolve: Resolve::new(gpu, tone_map),
-            display: Display::new(gpu, tone_map),
+            display: Display::new(gpu, Flavour::of(&Look::default())),
+            backdrop: None,
+            depth_of_field: None,
+            bloom: None,
+            grain: None,
+            antialias_format: wgpu::TextureFormat::Rgba8Unorm,
             antialias: None,
             transmittance: None,
             surface_data: None,
@@ -137,12 +153,16 @@ impl Passes {
         self.cropped_hair.prepare(gpu, width * height, has_hairs);
         let wanted = settings.antialias();
         let size = settings.output.size;
+        self.prepare_lens(gpu, scene, settings);
+        let format = self.display.format();
         if wanted.mode == antialias::Mode::None {
             self.antialias = None;
-        } else if self.antialias.as_ref().is_none_or(|a| *a.settings() != wanted || a.size() != size) {
-            let format = wgpu::TextureFormat::Rgba8Unorm;
+        } else if self.antialias_format != format
+            || self.antialias.as_ref().is_none_or(|a| *a.settings() != wanted || a.size() != size)
+        {
             self.antialias = Some(Antialias::new(gpu, &wanted, size, format)?);
         }
+        self.antialias_format = format;
         let profile = settings.quality.profile.shared();
         if settings.quality.transmit != TransmitMethod::ShadowDepth || !needs.transmittance {
             self.transmittance = None;
@@ -156,11 +176,45 @@ impl Passes {
         }
         let has_own_color = scene.heads.iter().any(|h| h.head.maps.as_ref().is_some_and(|m| m.has_own_color));
         self.shade.prepare_specular(gpu, settings.quality.specular, has_own_color);
-        if self.tone_map != settings.look.tone_map {
-            self.tone_map = settings.look.tone_map;
-            self.resolve = Resolve::new(gpu, self.tone_map);
-            self.display = Display::new(gpu, self.tone_map);
-        }
         Ok(())
+    }
+
+    /// Makes the passes from the resolve to the picture.
+    fn prepare_lens(&mut self, gpu: &Gpu, scene: &Scene<'_>, settings: &Settings) {
+        let (look, height) = (&settings.look, settings.output.size[1]);
+        if self.tone_map != look.tone_map {
+            self.tone_map = look.tone_map;
+            self.resolve = Resolve::new(gpu, self.tone_map);
+        }
+        let flavour = Flavour::of(look);
+        if self.display.flavour() != flavour {
+            self.display = Display::new(gpu, flavour);
+        }
+        let taps = match settings.quality.depth_of_field {
+            DepthOfFieldMethod::Gather(taps) if scene.optics.f_stop.is_some() => Some(taps),
+            _ => None,
+        };
+        let has_backdrop = backdrop::is_needed(look);
+        let keeps = taps.is_some();
+        if !has_backdrop {
+            self.backdrop = None;
+        } else if self.backdrop.as_ref().is_none_or(|b| !b.fits(keeps)) {
+            self.backdrop = Some(Backdrop::new(gpu, keeps));
+        }
+        match taps {
+            None => self.depth_of_field = None,
+            Some(taps) if self.depth_of_field.as_ref().is_some_and(|d| d.fits(taps, has_backdrop)) => {}
+            Some(taps) => self.depth_of_field = Some(DepthOfField::new(gpu, taps, has_backdrop)),
+        }
+        if look.bloom <= 0.0 {
+            self.bloom = None;
+        } else if self.bloom.as_ref().is_none_or(|b| !b.fits(look, height)) {
+            self.bloom = Some(Bloom::new(gpu, look, height));
+        }
+        if !look.has_noise() {
+            self.grain = None;
+        } else if self.grain.is_none() {
+            self.grain = Some(Grain::new(gpu));
+        }
     }
 }

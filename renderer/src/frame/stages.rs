@@ -5,8 +5,10 @@ use crate::channels::Channel;
 use crate::device::{Image, ImageSpec, Recorder};
 use crate::error::RenderError;
 use crate::passes::antialias::{self, History, Subsample};
+use crate::passes::backdrop;
 use crate::passes::diffusion::Before;
 use crate::passes::geometry::surface_data;
+use crate::passes::lens::depth_of_field::Behind;
 use crate::passes::shade::{Lighting, Lit, SkinLight};
 use crate::scene::lamp::{Illumination, place_lights};
 use crate::scene::placement::{average_light, receivers};
@@ -103,7 +105,8 @@ impl<'a> Frame<'a> {
         self.passes.shade.record(r, &lighting, &self.heads, samples.lit.as_ref())
     }
 
-    /// From the light of a sample to display values: compose, hair and films, what is seen through, resolve, display.
+    /// From the light of a sample to display values: compose, backdrop, hair and films, what is seen through, resolve, lens,
+    /// display.
     pub(crate) fn show(
         &mut self,
         r: &mut Recorder<'_>,
@@ -115,13 +118,23 @@ impl<'a> Frame<'a> {
     ) {
         let passes = self.passes;
         let inputs = [diffuse, &lit.albedo, &lit.direct, &seen.depth];
+        let look = &self.settings.look;
         let is_first = samples.seen.is_empty();
         let moves = is_first && self.remembers();
         let (hair, detail) = ((&passes.fibre, light), self.settings.quality.detail);
-        let sums = passes.cropped_hair.cover(r, hair, detail, &seen, &self.heads, moves);
-        let hdr = passes.compose.record(r, self.scene.background_linear, inputs, sums);
+        // A backdrop comes between skin and hairs.
+        let sums = match moves || passes.backdrop.is_some() {
+            true => None,
+            false => passes.cropped_hair.cover(r, hair, detail, &seen, &self.heads),
+        };
+        let mut hdr = passes.compose.record(r, self.scene.background_linear, inputs, sums);
+        let mut behind = None;
+        if let Some(pass) = &passes.backdrop {
+            (hdr, behind) = pass.record(r, look, self.scene, &seen, &self.heads, &hdr);
+        }
         let velocity = moves.then(|| passes.velocity.record(r, &seen, &self.heads));
-        passes.cropped_hair.record(r, hair, detail, &seen, &self.heads, &hdr, velocity.as_ref());
+        let rest = sums.is_some();
+        passes.cropped_hair.record(r, hair, detail, &seen, &self.heads, rest, &hdr, velocity.as_ref());
         let ambient = average_light(self.scene);
         passes.overlay.record(r, hair, ambient, &seen, &self.heads, &hdr, velocity.as_ref());
         let lighting = Lighting {
@@ -150,11 +163,19 @@ impl<'a> Frame<'a> {
             let images = pass.record(r, &seen, &self.heads);
             self.keep(surface_data::CHANNELS.into_iter().zip(&images));
         }
-        let look = &self.settings.look;
-        let resolved = passes.resolve.record(r, look, self.settings.samples_per_side(), hdr);
-        match self.into.filter(|_| passes.antialias.is_none()) {
-            Some(picture) => passes.display.record_into(r, look, &resolved, picture),
-            None => samples.displayed.push(passes.display.record(r, look, &resolved)),
+        let camera = &self.scene.camera;
+        let per_side = self.settings.samples_per_side();
+        let mut resolved = passes.resolve.record(r, look, per_side, hdr);
+        if let Some(pass) = &passes.depth_of_field {
+            let behind = behind.as_ref().map_or(Behind::Plain(backdrop::plain(self.scene)), Behind::Image);
+            let lens = (camera, &self.scene.optics);
+            resolved = pass.record(r, lens, per_side, resolved, &seen.depth, &behind);
+        }
+        let spread = passes.bloom.as_ref().map(|pass| pass.record(r, look, &resolved));
+        let spread = spread.as_ref();
+        match self.into.filter(|_| passes.antialias.is_none() && passes.grain.is_none()) {
+            Some(picture) => passes.display.record_into(r, look, camera, &resolved, spread, picture),
+            None => samples.displayed.push(passes.display.record(r, look, camera, &resolved, spread)),
         }
         samples.velocity = samples.velocity.take().or(velocity);
         samples.seen.push(seen);
@@ -173,7 +194,8 @@ impl<'a> Frame<'a> {
         let size = self.settings.output.size;
         let Some(antialias) = &self.passes.antialias else {
             self.remember(r);
-            return Ok(samples.displayed.into_iter().next());
+            let displayed = samples.displayed.into_iter().next();
+            return Ok(displayed.and_then(|displayed| self.finish(r, displayed)));
         };
         let colors: Vec<_> = samples.displayed.iter().map(Image::view).collect();
         let depths: Vec<_> = samples.seen.iter().map(|s| s.depth.view()).collect();
@@ -188,16 +210,31 @@ impl<'a> Frame<'a> {
             self.past.history = Some(History::new(r.gpu, size));
         }
         let history = if is_temporal { self.past.history.as_mut() } else { None };
-        let picture = match self.into {
+        let picture = match self.into.filter(|_| self.passes.grain.is_none()) {
             Some(_) => None,
-            None => Some(r.image("image", ImageSpec::storage(size, wgpu::TextureFormat::Rgba8Unorm))),
+            None => Some(r.image("image", ImageSpec::storage(size, self.passes.display.format()))),
         };
         let output = picture.as_ref().map(Image::view).or(self.into);
         if let Some(output) = output {
             antialias.record(r.gpu, r.encoder, r.timer, &inputs, output, history)?;
         }
         self.remember(r);
-        Ok(picture)
+        Ok(picture.and_then(|picture| self.finish(r, picture)))
+    }
+
+    /// Grain and dither of the antialiased picture, where the look has them: the picture, or none if it is in the frame's
+    /// target.
+    fn finish(&self, r: &mut Recorder<'_>, displayed: Image) -> Option<Image> {
+        let Some(grain) = &self.passes.grain else { return Some(displayed) };
+        let size = displayed.size();
+        let picture = match self.into {
+            Some(_) => None,
+            None => Some(r.image("picture", ImageSpec::storage(size, wgpu::TextureFormat::Rgba8Unorm))),
+        };
+        let into = picture.as_ref().map(Image::view).or(self.into)?;
+        let (look, optics) = (&self.settings.look, &self.scene.optics);
+        grain.record_into(r, look, optics, displayed.view(), into, size);
+        picture
     }
 
     /// Whether frames know how the surface moved since the one before.

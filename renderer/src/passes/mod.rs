@@ -2,11 +2,13 @@
 
 pub mod antialias;
 pub(crate) mod appearance;
+pub(crate) mod backdrop;
 pub(crate) mod compose;
 pub(crate) mod diffusion;
 pub(crate) mod display;
 pub(crate) mod geometry;
 pub(crate) mod hair;
+pub(crate) mod lens;
 pub(crate) mod resolve;
 pub(crate) mod see_through;
 pub(crate) mod shade;

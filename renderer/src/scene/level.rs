@@ -124,6 +124,7 @@ mod tests {
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         }
     }
 

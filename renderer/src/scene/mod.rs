@@ -12,6 +12,7 @@ pub(crate) mod hair_roots;
 pub(crate) mod head;
 pub(crate) mod lamp;
 pub(crate) mod level;
+mod optics;
 pub(crate) mod placement;
 pub(crate) mod posed_head;
 pub(crate) mod view;
@@ -21,6 +22,7 @@ pub use head::{
     ColorTable, HeadOnGpu, Ladder, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS,
     MAX_ZONES,
 };
+pub use optics::Optics;
 pub(crate) use posed_head::PosedHead;
 
 /// Lights that one frame can have; each may have a shadow map.
@@ -45,6 +47,8 @@ pub struct Scene<'a> {
     pub environment_intensity: f32,
     /// Radiance behind the heads, linear Rec. 709.
     pub background_linear: Vec3,
+    /// Lens, place of the backdrop, number of the frame. The default is a pinhole.
+    pub optics: Optics,
 }
 
 /// A head at a place in a state.

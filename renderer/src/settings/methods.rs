@@ -426,6 +426,35 @@ groups! {
         Linear, "linear", Picture, "IEC 61966-2-1";
         /// Shoulder, toe and linear part as one rational function; 4 becomes white.
         Filmic, "filmic", Picture, "Hable 2010; Jimenez 2012 section 8.3 and ch. 11";
+        /// Close to the reference rendering of ACES 1.0 for sRGB: strong contrast, bright colours turn pale.
+        Aces, "aces", Picture, "Hill 2016, fit of the ACES RRT and sRGB ODT";
+        /// A log curve between rotated primaries: soft contrast, bright colours turn pale without a change of hue.
+        Agx, "agx", Picture, "Sobotka 2022; polynomial of Wrensch 2023";
+        /// Colours below 0.76 stay as they are; only highlights are compressed and turn pale.
+        Neutral, "neutral", Picture, "Khronos PBR neutral tone mapper 2024";
+    }
+    /// Blur of what a lens with an aperture does not focus on.
+    DepthOfFieldMethod, "depth-of-field", "Depth of field, where the camera has an f-stop" {
+        /// Everything is in focus.
+        None, "none", Nowhere, "";
+        /// N taps in the largest circle of confusion that reaches a tile, each on a level as coarse as its share of the circle.
+        Gather(n: Number::any(8, 256, Some(48), "taps")), "gather", Picture, "Potmesil and Chakravarty 1981; Jimenez 2014";
+    }
+    /// What is behind the heads.
+    BackdropMethod, "backdrop", "What is behind the heads" {
+        /// One dark grey.
+        Plain, "plain", Nowhere, "";
+        /// A grey wall with a lamp on it behind the head, which falls off to the sides.
+        Gradient, "gradient", Picture, "inverse square law";
+        /// The surroundings of the sequence, out of focus; a plain grey without any.
+        Environment, "environment", Picture, "the environment of the sequence";
+    }
+    /// Noise that hides the steps of 8 bits.
+    DitherMethod, "dither", "Noise that hides the steps of 8 bits" {
+        /// Values are rounded.
+        None, "none", Nowhere, "";
+        /// Triangular noise of one step either way, the same for each frame number.
+        Triangular, "triangular", Picture, "Lipshitz, Wannamaker and Vanderkooy 1992";
     }
 }
 
@@ -476,7 +505,10 @@ mod tests {
         check::<AntialiasMethod>(&AntialiasMethod::GROUP);
         check::<ToneMap>(&ToneMap::GROUP);
         check::<CurvatureMethod>(&CurvatureMethod::GROUP);
-        assert_eq!(GROUPS.len(), 10, "a new group is checked above");
+        check::<DepthOfFieldMethod>(&DepthOfFieldMethod::GROUP);
+        check::<BackdropMethod>(&BackdropMethod::GROUP);
+        check::<DitherMethod>(&DitherMethod::GROUP);
+        assert_eq!(GROUPS.len(), 13, "a new group is checked above");
         assert_eq!(ScatterMethod::all().count(), ScatterMethod::GROUP.methods.len());
         assert_eq!("reference-surface".parse(), Ok(ScatterMethod::ReferenceSurface(64)));
     }

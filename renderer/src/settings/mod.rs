@@ -30,8 +30,9 @@ use crate::channels::Channel;
 pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
-    AntialiasMethod, ColorMethod, CurvatureMethod, DetailMethod, GROUPS, Group, Method, RasterMethod,
-    ScatterMethod, SpecularMethod, Stage, ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
+    AntialiasMethod, BackdropMethod, ColorMethod, CurvatureMethod, DepthOfFieldMethod, DetailMethod,
+    DitherMethod, GROUPS, Group, Method, RasterMethod, ScatterMethod, SpecularMethod, Stage, ToneMap,
+    TransmitMethod, UnknownMethod, WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
 
@@ -90,6 +91,8 @@ pub struct Quality {
     pub antialias_preset: AntialiasPreset,
     /// Which patterns of edges stand for which contours; published is for comparisons with the published tables
     pub antialias_patterns: AntialiasPatterns,
+    /// How the blur of a lens is computed, where the camera has an f-stop
+    pub depth_of_field: DepthOfFieldMethod,
     /// How far light goes in skin, for every scattering method
     pub profile: DiffusionProfile,
     /// Share of the skin's colour that texture-space gives to light before it scatters; 0 leaves all of it for after
@@ -128,9 +131,47 @@ pub struct Look {
     /// Factor of the light before the tone map
     #[schemars(range(min = 0, max = 1e6))]
     pub exposure: f32,
+    /// Stops of exposure on top of it: 1 is twice the light
+    #[schemars(range(min = -20, max = 20))]
+    pub ev: f32,
+    /// Colour temperature, in kelvin, of the light that is shown as white; less makes the picture bluer, 6504 changes nothing
+    #[schemars(range(min = 1500, max = 15000))]
+    pub temperature: f32,
+    /// Tint of the light that is shown as white, in steps of 1/3000 of CIE 1960 uv: above 0 the picture turns more magenta
+    #[schemars(range(min = -150, max = 150))]
+    pub tint: f32,
     /// From radiance to the brightness of a display
     pub tone_map: ToneMap,
+    /// Darker corners, in units of the natural fall-off of a lens: cos^4 of the angle to its axis
+    #[schemars(range(min = 0, max = 16))]
+    pub vignette: f32,
+    /// Share of the light that the lens spreads around bright places
+    #[schemars(range(min = 0, max = 1))]
+    pub bloom: f32,
+    /// How far it spreads the light, in heights of the picture
+    #[schemars(range(min = 0.002, max = 1))]
+    pub bloom_radius: f32,
+    /// Graininess of the film: 1000 times the standard deviation of density in a circle of 48 micrometres; fine film has 5 to 8,
+    /// fast film 15 to 30
+    #[schemars(range(min = 0, max = 100))]
+    pub grain: f32,
+    /// Size of the grain on the film, in micrometres
+    #[schemars(range(min = 1, max = 200))]
+    pub grain_size: f32,
+    /// Noise that hides the steps of 8 bits
+    pub dither: DitherMethod,
+    /// What is behind the heads
+    pub backdrop: BackdropMethod,
+    /// Factor of the light of the backdrop
+    #[schemars(range(min = 0, max = 1000))]
+    pub backdrop_light: f32,
+    /// Millimetres above the lower end of a head, and beside the cut of its shoulders, over which it fades into the backdrop
+    #[schemars(range(min = 0, max = 500))]
+    pub fade: f32,
 }
+
+/// Temperature that changes nothing, kelvin: that of D65, the white of displays.
+pub const NEUTRAL_KELVIN: f32 = 6504.0;
 
 /// Qualities by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -184,6 +225,7 @@ impl Default for Quality {
             antialias: AntialiasMethod::SmaaS2x,
             antialias_preset: AntialiasPreset::High,
             antialias_patterns: AntialiasPatterns::Revised,
+            depth_of_field: DepthOfFieldMethod::Gather(48),
             profile: DiffusionProfile::default(),
             pre_scatter: 0.0,
             map_savings: MapSaving::ALL.to_vec(),
@@ -194,7 +236,39 @@ impl Default for Quality {
 
 impl Default for Look {
     fn default() -> Self {
-        Self { exposure: 1.8, tone_map: ToneMap::Filmic }
+        Self {
+            exposure: 1.8,
+            ev: 0.0,
+            temperature: NEUTRAL_KELVIN,
+            tint: 0.0,
+            tone_map: ToneMap::Filmic,
+            vignette: 0.0,
+            bloom: 0.0,
+            bloom_radius: 0.1,
+            grain: 0.0,
+            grain_size: 10.0,
+            dither: DitherMethod::None,
+            backdrop: BackdropMethod::Plain,
+            backdrop_light: 1.0,
+            fade: 0.0,
+        }
+    }
+}
+
+impl Look {
+    /// Factor of the light before the tone map: `exposure` with its stops.
+    pub fn gain(&self) -> f32 {
+        self.exposure * self.ev.exp2()
+    }
+
+    /// Whether the picture gets noise after it is antialiased.
+    pub fn has_noise(&self) -> bool {
+        self.grain > 0.0 || self.dither != DitherMethod::None
+    }
+
+    /// Whether white is another than that of displays.
+    pub fn is_balanced(&self) -> bool {
+        self.temperature != NEUTRAL_KELVIN || self.tint != 0.0
     }
 }
 
@@ -280,10 +354,25 @@ impl Settings {
                 expected: "shadow-depth or none, or scatter texture-space".into(),
             });
         }
-        if !self.look.exposure.is_finite() {
+        let look = &self.look;
+        let numbers = [
+            ("exposure", look.exposure),
+            ("ev", look.ev),
+            ("temperature", look.temperature),
+            ("tint", look.tint),
+            ("vignette", look.vignette),
+            ("bloom", look.bloom),
+            ("bloomRadius", look.bloom_radius),
+            ("grain", look.grain),
+            ("grainSize", look.grain_size),
+            ("backdropLight", look.backdrop_light),
+            ("fade", look.fade),
+        ];
+        // JSON has no such numbers, so the schema does not say it.
+        if let Some((name, value)) = numbers.into_iter().find(|(_, value)| !value.is_finite()) {
             return Err(SettingsError::Range {
-                setting: "look.exposure".into(),
-                found: self.look.exposure.to_string(),
+                setting: format!("look.{name}"),
+                found: value.to_string(),
                 expected: "a finite number".into(),
             });
         }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use rubor::auto::{Auto, Bound, Calibration};
 use rubor::inputs::{self, LoadedHead};
 use rubor::job::{Format, FrameList};
+use rubor::looks;
 use rubor::notes::Note;
 use rubor::review::inset;
 use rubor::{Destination, Job, Outcome, Plan, Report, Studio, Watch, run};
@@ -54,6 +55,10 @@ pub(crate) struct Changes {
     /// Frames per second [default: the sequence's]
     #[arg(long)]
     fps: Option<f64>,
+    /// Lens and look that replace those of the sequence and the job: portrait, film-still, or a file of a look; flags replace
+    /// single settings
+    #[arg(long, value_name = "NAME|FILE")]
+    look: Option<String>,
     /// Draw a map of the (first) head's current state into a corner
     #[arg(long, value_enum, value_name = "MAP")]
     inset: Option<inset::Map>,
@@ -190,6 +195,9 @@ impl Changes {
     fn apply(&self, job: &mut Job) -> Outcome {
         if let Some(bound) = self.max_error.or(self.budget_ms) {
             job.auto = Some(Auto { bound, held: self.settings.given(), calibration: calibration()? });
+        }
+        if let Some(look) = &self.look {
+            console::notes(&looks::load(look)?.apply(job)?);
         }
         self.settings.overlay(&mut job.settings)?;
         job.sequence.fps = self.fps.unwrap_or(job.sequence.fps);

@@ -57,7 +57,12 @@ pub(crate) struct Methods {
     pub(crate) detail: &'static str,
     pub(crate) antialias: &'static str,
     pub(crate) tone_map: &'static str,
+    pub(crate) depth_of_field: &'static str,
+    pub(crate) backdrop: &'static str,
+    pub(crate) dither: &'static str,
     pub(crate) exposure: f32,
+    /// Further settings of the look, as JSON.
+    pub(crate) look: &'static str,
 }
 
 /// One picture.
@@ -89,7 +94,11 @@ const USUAL: Methods = Methods {
     detail: "auto",
     antialias: "none",
     tone_map: "filmic",
+    depth_of_field: "none",
+    backdrop: "plain",
+    dither: "none",
     exposure: 1.0,
+    look: "{}",
 };
 
 fn case(name: &str, scene: &'static str, methods: Methods) -> Case {
@@ -118,6 +127,9 @@ impl Methods {
             "detail" => self.detail,
             "antialias" => self.antialias,
             "tone-map" => self.tone_map,
+            "depth-of-field" => self.depth_of_field,
+            "backdrop" => self.backdrop,
+            "dither" => self.dither,
             _ => return None,
         })
     }
@@ -136,8 +148,15 @@ pub(crate) fn all() -> Vec<Case> {
         raster(),
         detail(),
         heads(),
+        small(lens()),
+        small(display()),
     ]
     .concat()
+}
+
+/// Stages after the light: smaller pictures show them as well.
+fn small(cases: Vec<Case>) -> Vec<Case> {
+    cases.into_iter().map(|case| Case { size: [64, 64], ..case }).collect()
 }
 
 fn scatter() -> Vec<Case> {
@@ -296,6 +315,58 @@ fn passes() -> Vec<Case> {
         case("pass-display-linear", "portrait", Methods { tone_map: "linear", ..USUAL }),
         case("pass-display-dark", "portrait", Methods { exposure: 0.25, ..USUAL }),
         case("pass-display-bright", "portrait", Methods { exposure: 4.0, ..USUAL }),
+    ]
+}
+
+/// Each stage of the lens by itself, and a portrait with all of them.
+fn lens() -> Vec<Case> {
+    let open = |name: &str, scene, depth_of_field| {
+        case(&format!("lens-{name}"), scene, Methods { depth_of_field, ..USUAL })
+    };
+    let look = |name: &str, look| case(&format!("lens-{name}"), "portrait", Methods { look, ..USUAL });
+    vec![
+        open("depth-of-field", "lens", "gather:48"),
+        open("depth-of-field-8", "lens", "gather:8"),
+        open("focus-on-the-ear", "lens-ear", "gather:48"),
+        look("bloom", r#"{ "bloom": 0.3, "bloomRadius": 0.3 }"#),
+        look("grain", r#"{ "grain": 60, "grainSize": 20 }"#),
+        look("coarse-grain", r#"{ "grain": 60, "grainSize": 900 }"#),
+        case("lens-fade", "bust", Methods { look: r#"{ "fade": 90 }"#, ..USUAL }),
+        Case {
+            // Nothing of the noise may stay in the history.
+            frames: 4,
+            ..case(
+                "lens-portrait",
+                "lens",
+                Methods {
+                    depth_of_field: "gather:48",
+                    backdrop: "gradient",
+                    dither: "triangular",
+                    antialias: "smaa-t2x",
+                    look: r#"{ "bloom": 0.1, "grain": 20, "vignette": 1, "fade": 60 }"#,
+                    ..USUAL
+                },
+            )
+        },
+    ]
+}
+
+fn display() -> Vec<Case> {
+    let tone_map = |tone_map: &'static str| {
+        case(&format!("display-{tone_map}"), "portrait", Methods { tone_map, exposure: 1.4, ..USUAL })
+    };
+    let backdrop = |backdrop: &'static str| {
+        case(&format!("display-backdrop-{backdrop}"), "bust", Methods { backdrop, ..USUAL })
+    };
+    let look = |name: &str, look| case(&format!("display-{name}"), "portrait", Methods { look, ..USUAL });
+    vec![
+        tone_map("aces"),
+        tone_map("agx"),
+        tone_map("neutral"),
+        backdrop("gradient"),
+        backdrop("environment"),
+        look("warm", r#"{ "temperature": 9000, "tint": 20, "ev": 0.5 }"#),
+        look("vignette", r#"{ "vignette": 8 }"#),
     ]
 }
 

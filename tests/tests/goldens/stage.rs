@@ -8,8 +8,8 @@ use rubor_assets::import;
 use rubor_renderer::channels;
 use rubor_renderer::settings::{Look, Output, Quality, Settings};
 use rubor_renderer::{
-    Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind, Renderer,
-    Scene, native,
+    Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Light, LightKind, Optics,
+    Renderer, Scene, native,
 };
 use rubor_rig::authored::{
     AlphaMode, AuthoredImage, AuthoredMaterial, AuthoredTexture, TextureTransform, Wrap,
@@ -222,7 +222,7 @@ impl Stage {
         methods: &Methods,
         channel: Channel,
     ) -> Outcome<Drawn> {
-        let settings = Settings {
+        let mut settings = Settings {
             output: Output {
                 size,
                 channels: channels::CHANNELS.iter().map(|row| row.channel).collect(),
@@ -237,11 +237,21 @@ impl Stage {
                 wrinkles: methods.wrinkles.parse()?,
                 specular: methods.specular.parse()?,
                 antialias: methods.antialias.parse()?,
+                depth_of_field: methods.depth_of_field.parse()?,
                 shadow_size: SHADOW_SIZE,
                 ..Quality::default()
             },
-            look: Look { exposure: methods.exposure, tone_map: methods.tone_map.parse()? },
+            look: Look {
+                exposure: methods.exposure,
+                tone_map: methods.tone_map.parse()?,
+                backdrop: methods.backdrop.parse()?,
+                dither: methods.dither.parse()?,
+                ..Look::default()
+            },
         };
+        settings.overlay(
+            &serde_json::json!({ "look": serde_json::from_str::<serde_json::Value>(methods.look)? }),
+        )?;
         let mut image = Vec::new();
         self.renderer.cut(0);
         for shot in frames {
@@ -274,6 +284,14 @@ impl Stage {
                 environment_rotation: shot.environment.as_ref().map_or(0.0, |e| e.rotation_y),
                 environment_intensity: shot.environment.as_ref().map_or(0.0, |e| e.intensity),
                 background_linear: BACKDROP_LINEAR,
+                optics: Optics {
+                    frame: shot.frame,
+                    sensor_height_mm: shot.camera.lens.sensor_height_mm,
+                    f_stop: shot.camera.lens.f_stop,
+                    focus_metres: shot.camera.lens.focus_metres,
+                    subject: shot.place.origin,
+                    subject_height: shot.place.head_height,
+                },
             };
             let gpu = self.renderer.gpu().clone();
             image = native::wait(&gpu, self.renderer.render(&scene, &settings))?.0.rgba;

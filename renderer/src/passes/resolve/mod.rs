@@ -7,7 +7,8 @@
 //! Theory: a bright highlight must not swallow the edge that it stands on, so the mean is taken of display values
 //! (B. Karis 2013, "Tone mapping" of samples) and converted back by the inverse of the tone map. Lens and display then
 //! work at the size of the picture, and the displayed value is the mean of the samples' displayed values but for the
-//! rounding of a half float.
+//! rounding of a half float. The filmic curve stands for all tone maps but the linear one: it can be inverted, and only the weights of
+//! samples depend on it.
 //!
 //! Costs nothing with one sample: the pass does not run.
 
@@ -25,7 +26,7 @@ pub(crate) const TONE: Module = module!("tone", "../../shared/tone.wesl");
 
 /// The shader of the pass.
 pub(crate) fn program(tone_map: ToneMap) -> Program {
-    Program::new(SHADER).with(&[TONE]).constant("FILMIC", tone_map == ToneMap::Filmic)
+    Program::new(SHADER).with(&[TONE]).constant("FILMIC", tone_map != ToneMap::Linear)
 }
 
 #[repr(C)]
@@ -53,7 +54,7 @@ impl Resolve {
         }
         let size = hdr.size().map(|n| n / samples);
         let resolved = r.image("resolved", ImageSpec::light(size));
-        let params = r.uniform("resolve", &Params { exposure: look.exposure, samples, padding: [0; 2] });
+        let params = r.uniform("resolve", &Params { exposure: look.gain(), samples, padding: [0; 2] });
         let resources = [("params", params.bound()), ("hdr", hdr.bound()), ("resolved", resolved.bound())];
         r.dispatch(&self.kernel, &resources, pixel_groups(size));
         resolved

@@ -65,6 +65,7 @@ fn draw(renderer: &mut Renderer, panes: &[Pane]) -> Vec<[f32; 4]> {
         environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: BACKGROUND,
+        optics: Default::default(),
     };
     render(renderer, &scene, &settings([SIZE; 2])).expect("it draws");
     read_texels(renderer, Channel::Radiance)

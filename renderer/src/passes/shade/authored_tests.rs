@@ -41,6 +41,7 @@ fn draw(renderer: &mut Renderer, head: &Head, lights: &[Light], with_sky: bool) 
         environment_rotation: 0.0,
         environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     render(renderer, &scene, &settings([SIZE; 2])).expect("it draws");
     read_texels(renderer, Channel::Radiance)

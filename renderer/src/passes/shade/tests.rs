@@ -71,6 +71,7 @@ fn row(renderer: &mut Renderer, material: Material, has_flap: bool) -> Vec<f32> 
         environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let mut settings = settings([SIZE; 2]);
     settings.quality.shadow_size = 1024;
@@ -182,6 +183,7 @@ fn a_lamp_on_bare_skin_is_the_equation() {
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         render(&mut renderer, &scene, &settings).expect("it draws");
         let (compared, largest) =
@@ -236,6 +238,7 @@ fn light_on_skin_of_its_own_colour_is_that_of_a_base_colour() {
             environment_rotation: 0.0,
             environment_intensity: 1.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         let expected = reference::MetallicRoughness {
             base: f64::from(base),
@@ -323,6 +326,7 @@ fn skin_of_its_own_colour_shows_it_and_follows_blood() {
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         render(&mut renderer, &scene, &settings([size; 2])).expect("it draws");
         read_texels(&renderer, Channel::Albedo)
@@ -381,6 +385,7 @@ fn relief_that_was_given_has_the_slopes_of_its_map() {
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         render(&mut renderer, &scene, &settings).expect("it draws");
         let middle = read_texels(&renderer, Channel::Irradiance)[(size / 2 * size + size / 2) as usize][1];

@@ -56,7 +56,13 @@ fn body(head: &Head, normals: Normals) -> Body {
 }
 
 fn camera(z: f32, degrees: f32) -> CameraState {
-    CameraState { position: Vec3::Z * z, target: Vec3::ZERO, up: Vec3::Y, fov_y: degrees.to_radians() }
+    CameraState {
+        position: Vec3::Z * z,
+        target: Vec3::ZERO,
+        up: Vec3::Y,
+        fov_y: degrees.to_radians(),
+        lens: Default::default(),
+    }
 }
 
 fn sun(direction: Vec3) -> LightState {

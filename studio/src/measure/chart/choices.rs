@@ -201,7 +201,8 @@ mod tests {
         let whole = groups(Suite::Whole, &Settings::default(), &[], &[], EFFORT).unwrap();
         for group in GROUPS {
             let is_charted = whole.iter().any(|g| g.flag == group.name);
-            let is_taste = ["specular", "tone-map"].contains(&group.name);
+            let is_taste =
+                ["specular", "tone-map", "depth-of-field", "backdrop", "dither"].contains(&group.name);
             // Only pre-integrated light asks for the curvature.
             assert!(is_charted != (is_taste || group.name == "curvature"), "{}", group.name);
         }

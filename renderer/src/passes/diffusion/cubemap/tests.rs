@@ -348,6 +348,7 @@ impl Stage {
             environment_rotation: 0.0,
             environment_intensity: 1.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         render(&mut self.renderer, &scene, &settings).unwrap();
         let strength = read_texels(&self.renderer, Channel::Albedo);

@@ -212,6 +212,7 @@ fn scene<'a>(
         environment_rotation: 0.0,
         environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     }
 }
 

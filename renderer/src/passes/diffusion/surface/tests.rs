@@ -77,6 +77,7 @@ fn draw(
         environment_rotation: 0.0,
         environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let settings = Settings {
         output: Output {

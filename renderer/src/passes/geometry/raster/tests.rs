@@ -144,6 +144,7 @@ fn seen(gpu: &Gpu, head: &Head, size: [u32; 2], rasteriser: Rasteriser) -> (Vec<
         environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let instances = [Instance::new(gpu, &on_gpu)];
     let points: Vec<[f32; 4]> = head.mesh.points.iter().map(|p| p.extend(1.0).to_array()).collect();
@@ -278,6 +279,7 @@ fn frames_are_those_of_the_raster_units() {
                 environment_rotation: 0.0,
                 environment_intensity: 0.0,
                 background_linear: Vec3::ZERO,
+                optics: Default::default(),
             };
             frame(&mut renderer, &scene, method)
         });

@@ -57,6 +57,7 @@ fn normals_chromophores_and_parts_are_those_of_the_point_that_a_pixel_sees() {
         environment_rotation: 0.0,
         environment_intensity: 0.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let size = 41;
     let mut settings = settings([size; 2]);

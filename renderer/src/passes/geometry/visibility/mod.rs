@@ -219,6 +219,7 @@ mod tests {
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         let instances = [0, 1].map(|_| Instance::new(gpu, &on_gpu));
         let points: Vec<[f32; 4]> = head.mesh.points.iter().map(|p| p.extend(1.0).to_array()).collect();

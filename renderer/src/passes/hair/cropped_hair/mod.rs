@@ -116,17 +116,17 @@ impl CroppedHair {
     }
 
     /// How the hairs of a head are drawn.
-    fn way(&self, seen: &Seen, head: &PosedHead<'_>, moves: bool) -> Way {
+    fn way(&self, seen: &Seen, head: &PosedHead<'_>) -> Way {
         let [width, height] = seen.ids.size().map(u64::from);
         let pixel = seen.pixel_metres(head.index);
         let is_thin = WIDTH_METRES <= MOST_SUMMED_OPACITY * THINNEST_PIXELS * pixel;
-        match self.cover.is_some() && self.sums.size() >= 16 * width * height && is_thin && !moves {
+        match self.cover.is_some() && self.sums.size() >= 16 * width * height && is_thin {
             true => Way::Summed,
             false => Way::Blended,
         }
     }
 
-    /// Sums up the hairs of heads that are drawn so, for a frame with or without motion; none if there are none.
+    /// Sums up the hairs of heads that are drawn so; none if there are none.
     pub(crate) fn cover(
         &self,
         r: &mut Recorder<'_>,
@@ -134,10 +134,9 @@ impl CroppedHair {
         detail: DetailMethod,
         seen: &Seen,
         heads: &[PosedHead<'_>],
-        moves: bool,
     ) -> Option<&wgpu::Buffer> {
         let kernel = self.cover.as_ref()?;
-        let drawn = self.drawn(seen, heads, moves, Way::Summed);
+        let drawn = self.drawn(heads, |h| self.way(seen, h) == Way::Summed);
         if drawn.is_empty() {
             return None;
         }
@@ -147,16 +146,14 @@ impl CroppedHair {
         Some(&self.sums)
     }
 
-    /// Heads whose hairs are drawn in a way.
+    /// Heads with hairs of a kind.
     fn drawn<'h, 'a>(
         &self,
-        seen: &Seen,
         heads: &'h [PosedHead<'a>],
-        moves: bool,
-        way: Way,
+        is_drawn: impl Fn(&PosedHead<'a>) -> bool,
     ) -> Vec<&'h PosedHead<'a>> {
         let has_hairs = |h: &&PosedHead<'_>| h.head.hair_root_count > 0 && h.head.maps.is_some();
-        heads.iter().filter(has_hairs).filter(|h| self.way(seen, h, moves) == way).collect()
+        heads.iter().filter(has_hairs).filter(|h| is_drawn(h)).collect()
     }
 
     /// Runs a kernel once for each hair of heads; `out` is what else it binds.
@@ -193,7 +190,7 @@ impl CroppedHair {
         r.dispatch_each(kernel, each);
     }
 
-    /// Draws the hairs of heads that are not summed up over a picture and, where there is one, over its motion.
+    /// Draws the hairs of heads, or the `rest` that [`CroppedHair::cover`] left, over a picture and, where there is one, over its motion.
     pub(crate) fn record(
         &self,
         r: &mut Recorder<'_>,
@@ -201,10 +198,11 @@ impl CroppedHair {
         detail: DetailMethod,
         seen: &Seen,
         heads: &[PosedHead<'_>],
+        rest: bool,
         hdr: &Image,
         velocity: Option<&Image>,
     ) {
-        let drawn = self.drawn(seen, heads, velocity.is_some(), Way::Blended);
+        let drawn = self.drawn(heads, |h| !rest || self.way(seen, h) == Way::Blended);
         if drawn.is_empty() {
             return;
         }

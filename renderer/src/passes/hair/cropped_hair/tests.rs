@@ -117,6 +117,7 @@ fn a_hair_moves_with_its_root() {
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         render(&mut renderer, &scene, &settings).expect("it draws");
     }
@@ -174,6 +175,7 @@ fn the_first_hairs_stand_for_all() {
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::ZERO,
+            optics: Default::default(),
         };
         let mut settings = settings([96; 2]);
         settings.quality.detail = detail;
