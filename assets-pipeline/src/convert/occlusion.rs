@@ -373,6 +373,30 @@ mod tests {
     }
 
     #[test]
+    fn a_pose_that_shares_rays_sees_what_one_that_traces_all_sees() {
+        let head = under_a_lid();
+        let (rays, everywhere) = (Rays::new(64), vec![true; head.mesh.points.len()]);
+        let half: Vec<bool> = (0..head.mesh.points.len()).map(|i| i % 2 == 0).collect();
+        let traced = |weight: f32, wanted: &[bool], from: Option<&Traced>| {
+            let points = deform_points(&head.mesh, &head.shapes, &[weight]);
+            Traced::new(&head, &points, &rays, wanted, from)
+        };
+        let rest = traced(0.0, &everywhere, None);
+        let rest_of_half = traced(0.0, &half, None);
+        let mut changed = 0;
+        for weight in [0.0, 0.3, 1.0] {
+            let truth = traced(weight, &everywhere, None).visibility();
+            let shared = traced(weight, &everywhere, Some(&rest));
+            assert_eq!(shared.visibility(), truth, "{weight}");
+            // From a pose that knows some of the points, and back to rest.
+            assert_eq!(traced(weight, &everywhere, Some(&rest_of_half)).visibility(), truth, "{weight}");
+            assert_eq!(traced(0.0, &everywhere, Some(&shared)).visibility(), rest.visibility());
+            changed += truth.iter().zip(rest.visibility()).filter(|(a, b)| **a != *b).count();
+        }
+        assert!(changed > 20, "{changed} changes make a poor test");
+    }
+
+    #[test]
     fn changes_at_rest_and_at_their_weights_are_those_of_the_posed_head() {
         let mut head = under_a_lid();
         bake(&mut head, 512);
