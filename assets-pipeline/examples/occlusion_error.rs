@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use rubor_assets::convert::occlusion::{self, Blockers, SHAPES};
+use rubor_assets::convert::occlusion::{self, Blockers, Rays, SHAPES};
 use rubor_assets::import;
 use rubor_rig::deform::{blend_occlusion, deform_points, point_normals};
 use rubor_rig::evaluate::Evaluator;
@@ -243,6 +243,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn pose(head: &Head, name: &str, weights: &[f32], specular: &mut Vec<Row>, rough: &mut Vec<Row>) {
     let points = deform_points(&head.mesh, &head.shapes, weights);
     let blockers = Blockers::new(&head.mesh, &points, head.height());
+    let rays = Rays::new(RAYS);
     let baked = [head.mesh.occlusion.clone(), blend_occlusion(&head.mesh, &head.shapes, weights)];
     let eye = (head.landmarks["eye-left"] + head.landmarks["eye-right"]) / 2.0;
     let target = eye + Vec3::new(0.0, -0.03, -0.05);
@@ -260,7 +261,7 @@ fn pose(head: &Head, name: &str, weights: &[f32], specular: &mut Vec<Row>, rough
             .filter_map(|i| {
                 let pixel = view.pixels[*i]?;
                 let turn = (*i as u32).wrapping_mul(0x9E37_79B9) as f32 / 2_f32.powi(32);
-                let truth = blockers.visibility(pixel.place, pixel.normal, RAYS, turn);
+                let truth = blockers.visibility(pixel.place, pixel.normal, &rays, turn);
                 let of = |list: &[f32]| -> f32 {
                     (0..3).map(|k| pixel.weights[k] * list[pixel.points[k]]).sum::<f32>().clamp(0.0, 1.0)
                 };

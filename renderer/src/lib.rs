@@ -39,7 +39,7 @@ pub use device::{AdapterDescription, FrameTimes, Gpu, PassTimer, PendingTimes};
 pub use error::RenderError;
 pub use passes::antialias;
 pub use passes::diffusion::surface::BARE_SKIN;
-pub use renderer::{Drawn, FrameStats, Image, Renderer};
+pub use renderer::{Arrived, Drawn, FrameStats, Image, Renderer};
 pub use scene::{
     Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Ladder, Light, LightKind,
     MAX_DISTRIBUTIONS, MAX_HEADS, MAX_HEMOGLOBIN, MAX_LIGHTS, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,

@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 use serde::Serialize;
 
 use crate::channels::{Channel, ChannelData, Extent};
-use crate::device::readback::{Readback, TextureReadback};
-use crate::device::{FrameTimes, Gpu, Image as FrameImage, Images, PassTimer, PendingTimes, Recorder};
+use crate::device::readback::{Coming, Mapped, Readback, TextureReadback};
+use crate::device::{FrameTimes, Gpu, Image as FrameImage, Images, PassTimer, PendingTimes, Recorder, Ticks};
 use crate::error::RenderError;
 use crate::frame::{Frame, Passes, Past, realtime, reference};
 use crate::passes::antialias::{self, Antialias, History};
@@ -35,6 +35,8 @@ pub struct Image {
 pub struct FrameStats {
     /// GPU milliseconds of each pass, in order; empty where the adapter has no timestamps.
     pub passes_ms: Vec<(&'static str, f64)>,
+    /// GPU milliseconds from the beginning of the first pass to the end of the last; 0 without timestamps.
+    pub frame_ms: f64,
     /// Triangles of all heads.
     pub triangles: u64,
     /// Bytes of heads, buffers and images on the device.
@@ -77,18 +79,44 @@ pub struct Drawn {
     channels: Vec<(Channel, Copy)>,
 }
 
+/// A frame that the device is done with.
+pub struct Arrived {
+    picture: TextureReadback<Mapped>,
+    times: Ticks<Mapped>,
+    stats: FrameStats,
+    channels: Vec<(Channel, Copy<Mapped>)>,
+}
+
 /// Numbers of a channel, being read back.
-enum Copy {
-    Image(TextureReadback, wgpu::TextureFormat),
-    Buffer(Readback),
+enum Copy<B = Readback> {
+    Image(TextureReadback<B>, wgpu::TextureFormat),
+    Buffer(B),
 }
 
 impl Copy {
-    async fn read(self, channel: Channel) -> Result<ChannelData, RenderError> {
+    fn ask(self) -> Copy<Coming> {
+        match self {
+            Self::Image(texels, format) => Copy::Image(texels.ask(), format),
+            Self::Buffer(floats) => Copy::Buffer(floats.ask()),
+        }
+    }
+}
+
+impl Copy<Coming> {
+    async fn arrive(self) -> Result<Copy<Mapped>, RenderError> {
+        Ok(match self {
+            Self::Image(texels, format) => Copy::Image(texels.arrive().await?, format),
+            Self::Buffer(floats) => Copy::Buffer(floats.arrive().await?),
+        })
+    }
+}
+
+impl Copy<Mapped> {
+    fn take(self, channel: Channel) -> Result<ChannelData, RenderError> {
         match self {
             Self::Image(texels, format) => {
                 let size = texels.size;
-                let bytes = texels.read().await?;
+                let bytes = texels.texels()?;
                 let values = match format {
                     wgpu::TextureFormat::Rgba16Float => {
                         let texels: Vec<[half::f16; 4]> = bytemuck::pod_collect_to_vec(&bytes);
@@ -100,8 +128,7 @@ impl Copy {
                 Ok(ChannelData { channel, size, values })
             }
             Self::Buffer(floats) => {
-                let bytes = floats.read().await?;
-                let values = of_points(channel, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
+                let values = of_points(channel, &bytemuck::pod_collect_to_vec::<u8, f32>(&floats.bytes()?));
                 let count = values.len() / channel.row().components.len();
                 Ok(ChannelData { channel, size: [count as u32, 1], values })
             }
@@ -124,16 +151,46 @@ impl Drawn {
     /// # Errors
     /// The device failed.
     pub async fn finish_with_channels(self) -> Result<(Image, FrameStats, Vec<ChannelData>), RenderError> {
-        self.gpu.wants(self.submission);
-        let [width, height] = self.picture.size;
-        let rgba = self.picture.read().await?;
-        let passes_ms = self.times.read().await?.passes_ms;
-        let mut channels = Vec::new();
-        for (channel, copy) in self.channels {
-            channels.push(copy.read(channel).await?);
+        self.arrive().await?.take()
+    }
+
+    /// Waits until the device is done with the frame. Nothing is copied yet.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub async fn arrive(self) -> Result<Arrived, RenderError> {
+        let Self { gpu, submission, picture, times, stats, channels } = self;
+        gpu.wants(submission);
+        // All are asked for before the first is waited for: who waits then waits for this frame alone.
+        let (picture, times) = (picture.ask(), times.ask());
+        let coming: Vec<_> = channels.into_iter().map(|(channel, copy)| (channel, copy.ask())).collect();
+        let (picture, times) = (picture.arrive().await?, times.arrive().await?);
+        let mut channels = Vec::with_capacity(coming.len());
+        for (channel, copy) in coming {
+            channels.push((channel, copy.arrive().await?));
         }
-        self.gpu.check()?;
-        Ok((Image { width, height, rgba }, FrameStats { passes_ms, ..self.stats }, channels))
+        gpu.check()?;
+        Ok(Arrived { picture, times, stats, channels })
+    }
+}
+
+impl Arrived {
+    /// The picture, its cost and its channels: copies them out of memory of the device, on any thread.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn take(self) -> Result<(Image, FrameStats, Vec<ChannelData>), RenderError> {
+        let [width, height] = self.picture.size;
+        let rgba = self.picture.texels()?;
+        let FrameTimes { passes_ms, frame_ms } = self.times.times()?;
+        let channels = self.channels.into_iter().map(|(channel, copy)| copy.take(channel));
+        let channels = channels.collect::<Result<_, _>>()?;
+        Ok((Image { width, height, rgba }, FrameStats { passes_ms, frame_ms, ..self.stats }, channels))
+    }
+
+    /// Channels that it has.
+    pub fn channels(&self) -> usize {
+        self.channels.len()
     }
 }
 
@@ -177,6 +234,12 @@ impl Renderer {
     #[cfg(test)]
     pub(crate) fn diffusion(&mut self) -> &mut Option<Box<dyn crate::passes::diffusion::Diffusion>> {
         &mut self.diffusion.method
+    }
+
+    /// The pass that shades, for tests that change it.
+    #[cfg(test)]
+    pub(crate) fn shade(&mut self) -> &mut crate::passes::shade::Shade {
+        &mut self.passes.shade
     }
 
     fn forget_light(&mut self) {
@@ -363,7 +426,7 @@ impl Renderer {
             return Ok(ChannelData { channel, size: [0, 0], values: Vec::new() });
         };
         self.gpu.queue.submit([encoder.finish()]);
-        let data = copy.read(channel).await?;
+        let data = copy.ask().arrive().await?.take(channel)?;
         self.gpu.check()?;
         Ok(data)
     }
@@ -496,6 +559,7 @@ impl Renderer {
         };
         let stats = FrameStats {
             passes_ms: Vec::new(),
+            frame_ms: 0.0,
             triangles: scene.heads.iter().map(triangles).sum(),
             memory_bytes: self.memory_bytes(scene),
             scatter_noise,

@@ -34,6 +34,10 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     assert_workgroups(&tangent_frames::program(), &line("tangent_frames"));
     assert_workgroups(&appearance::program(), &square("appearance"));
     assert_workgroups(&shade::program(), &square("shade"));
+    assert_workgroups(&shade::tiles_program(), &[("list_tiles", [64, 1, 1])]);
+    for only_skin in [false, true] {
+        assert_workgroups(&shade::listed_program(only_skin), &square("shade"));
+    }
     for with_normals in [false, true] {
         assert_workgroups(&shade::samples_program(with_normals), &line("light_samples"));
     }

@@ -25,7 +25,7 @@ use exr::prelude::{
 use rubor_renderer::channels::{Channel, ChannelData};
 use rubor_rig::head::Material;
 
-use crate::error::Outcome;
+use crate::error::{Failure, Outcome};
 use crate::output;
 
 /// Channels that the file is made of.
@@ -69,11 +69,19 @@ pub struct About {
     pub near_metres: f32,
 }
 
-/// Writes the layers of a frame. Channels that the frame does not have are left out.
+/// Writes the layers of a frame: see [`encode`].
 ///
 /// # Errors
 /// The system reports an error.
 pub fn write(path: &Path, channels: &[ChannelData], about: &About) -> Outcome {
+    output::write(path, &encode(channels, about)?)
+}
+
+/// The layers of a frame as the bytes of a file. Channels that the frame does not have are left out.
+///
+/// # Errors
+/// The encoder fails.
+pub fn encode(channels: &[ChannelData], about: &About) -> Outcome<Vec<u8>> {
     let [width, height] = about.size.map(|n| n as usize);
     let mut all = Vec::new();
     for data in channels.iter().filter(|data| CHANNELS.contains(&data.channel)) {
@@ -98,7 +106,9 @@ pub fn write(path: &Path, channels: &[ChannelData], about: &About) -> Outcome {
     frame.chromaticities = Some(REC_709);
     let mut image = Image::from_layer(layer);
     image.attributes = frame;
-    output::commit(path, |partial| image.write().to_file(partial).map_err(std::io::Error::other))
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write().to_buffered(&mut bytes).map_err(Failure::job)?;
+    Ok(bytes.into_inner())
 }
 
 /// Frames per second as a ratio: whole, NTSC (n * 1000 / 1001), or to a thousandth.

@@ -41,6 +41,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::exit)]
 
 pub mod auto;
+pub mod cache;
 mod claim;
 pub mod environment;
 pub mod error;
@@ -60,6 +61,7 @@ pub mod review;
 pub mod run;
 pub mod stop;
 pub mod studio;
+pub mod utilisation;
 pub mod walks;
 pub mod watch;
 mod writers;

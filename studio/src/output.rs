@@ -64,11 +64,29 @@ pub fn save_map(path: &Path, map: &Map, kind: SampleKind) -> Outcome {
     })
 }
 
-/// Writes a channel as OpenEXR under the names of its components; ids are whole numbers, all else are floats.
+/// A picture as the bytes of a PNG file.
+///
+/// # Errors
+/// The encoder fails.
+pub fn encode_png(picture: &image::RgbImage) -> Outcome<Vec<u8>> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, image::ImageFormat::Png).map_err(Failure::job)?;
+    Ok(bytes.into_inner())
+}
+
+/// Writes a channel as OpenEXR: see [`encode_channel`].
 ///
 /// # Errors
 /// The system reports an error.
 pub fn save_channel(path: &Path, data: &ChannelData) -> Outcome {
+    write(path, &encode_channel(data)?)
+}
+
+/// A channel as the bytes of an OpenEXR file under the names of its components; ids are whole numbers, all else are floats.
+///
+/// # Errors
+/// The encoder fails.
+pub fn encode_channel(data: &ChannelData) -> Outcome<Vec<u8>> {
     use exr::prelude::{
         AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder,
         WritableImage,
@@ -89,8 +107,9 @@ pub fn save_channel(path: &Path, data: &ChannelData) -> Outcome {
         Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS },
         AnyChannels::sort(channels),
     );
-    let image = Image::from_layer(layer);
-    commit(path, |partial| image.write().to_file(partial).map_err(std::io::Error::other))
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(Failure::job)?;
+    Ok(bytes.into_inner())
 }
 
 #[cfg(test)]

@@ -2,13 +2,16 @@
 //!
 //! ```text
 //! Job + heads --new--> Plan --shots--> shots of a frame
-//! frames to draw --draw--> device: n+1 | finish: n --> taker
+//! frames to draw --evaluate, a thread--> shots: n+4, n+3 --record--> device: n+2, n+1 --arrive--> n --> taker
 //! ```
 //!
 //! Frames do not depend on which others are drawn. Antialiasing over time mixes the light of the previous frame into a
 //! frame, depending on the speeds of both, and the speed of the previous frame comes from positions one frame earlier.
 //! So where a frame does not follow the last one drawn, the two before it are drawn first, after a cut. For motion as a
 //! channel it is the one before.
+
+use std::collections::VecDeque;
+use std::sync::mpsc::sync_channel;
 
 use rubor_renderer::channels::Channel;
 use rubor_renderer::settings::Settings;
@@ -20,12 +23,18 @@ use crate::error::{Failure, Outcome};
 use crate::inputs::LoadedHead;
 use crate::job::{FrameList, Job, MOST_FRAMES};
 use crate::notes::Note;
-use crate::studio::{Frame, Studio};
+use crate::studio::{Arrived, Frame, Studio};
+use crate::utilisation::{Clock, Work};
 
 /// Share of the width of a head that is left free between two heads.
 const SPACING: f32 = 1.05;
 /// Frames before a frame that its pixels depend on, with antialiasing over time.
 const REMEMBERED_FRAMES: u32 = 2;
+
+/// Frames whose shots are evaluated before the device has room for them.
+const FRAMES_AHEAD: usize = 2;
+/// Frames that are submitted before the oldest is waited for: the device has work while the next one is recorded.
+const FRAMES_IN_FLIGHT: usize = 2;
 
 /// A job that can be drawn.
 pub struct Plan<'a> {
@@ -198,33 +207,92 @@ impl<'a> Plan<'a> {
         frames: &[u32],
         mut take: impl FnMut(Shown) -> Outcome,
     ) -> Outcome {
+        let take =
+            |Coming { frame, shots, drawn }: Coming| take(Shown { frame, shots, drawn: drawn.take()? });
+        self.draw_ahead(studio, frames, &Clock::start(), take)
+    }
+
+    /// As [`Plan::draw`], with frames whose pictures are still in memory of the device, and work noted by a clock.
+    pub(crate) fn draw_ahead(
+        &self,
+        studio: &mut Studio,
+        frames: &[u32],
+        clock: &Clock,
+        mut take: impl FnMut(Coming) -> Outcome,
+    ) -> Outcome {
+        let steps = self.steps(frames);
+        let (ahead, evaluated) = sync_channel(FRAMES_AHEAD);
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                for step in steps {
+                    let shots = clock.time(Work::Evaluate, || self.shots(step.frame));
+                    // Drawing ended early.
+                    if ahead.send((step, shots)).is_err() {
+                        return;
+                    }
+                }
+            });
+            let mut waiting = VecDeque::new();
+            let mut arrive = |studio: &mut Studio, (frame, shots, drawn)| {
+                take(Coming { frame, shots, drawn: studio.arrive(drawn)? })
+            };
+            for (step, shots) in evaluated {
+                let drawn = clock.time(Work::Record, || {
+                    if step.is_cut {
+                        studio.cut(step.frame);
+                    }
+                    studio.draw(&shots, self.spacing_m, self.settings(step.frame))
+                })?;
+                if step.is_shown {
+                    waiting.push_back((step.frame, shots, drawn));
+                }
+                if waiting.len() > FRAMES_IN_FLIGHT
+                    && let Some(oldest) = waiting.pop_front()
+                {
+                    arrive(studio, oldest)?;
+                }
+            }
+            waiting.into_iter().try_for_each(|frame| arrive(studio, frame))
+        })
+    }
+
+    /// Frames to draw for those that are wanted, in their order.
+    fn steps(&self, frames: &[u32]) -> Vec<Step> {
         let settings = &self.settings;
         let before = match settings.quality.antialias.is_temporal() {
             true => REMEMBERED_FRAMES,
             false => u32::from(settings.output.channels.contains(&Channel::Velocity)),
         };
+        let mut steps = Vec::new();
         let mut last = None;
-        let mut waiting = None;
         for &frame in frames {
-            if last.is_none_or(|last: u32| last.checked_add(1) != Some(frame)) {
-                let start = frame.saturating_sub(before);
-                studio.cut(start);
-                for earlier in start..frame {
-                    studio.draw(&self.shots(earlier), self.spacing_m, self.settings(earlier))?;
-                }
-            }
+            let follows = last.is_some_and(|last: u32| last.checked_add(1) == Some(frame));
+            let start = if follows { frame } else { frame.saturating_sub(before) };
+            steps.extend((start..=frame).map(|earlier| Step {
+                frame: earlier,
+                is_cut: !follows && earlier == start,
+                is_shown: earlier == frame,
+            }));
             last = Some(frame);
-            let shots = self.shots(frame);
-            let drawn = studio.draw(&shots, self.spacing_m, self.settings(frame))?;
-            if let Some((frame, shots, drawn)) = waiting.replace((frame, shots, drawn)) {
-                take(Shown { frame, shots, drawn: studio.finish(drawn)? })?;
-            }
         }
-        match waiting {
-            Some((frame, shots, drawn)) => take(Shown { frame, shots, drawn: studio.finish(drawn)? }),
-            None => Ok(()),
-        }
+        steps
     }
+}
+
+/// A frame that is drawn.
+struct Step {
+    frame: u32,
+    /// It follows no frame before it.
+    is_cut: bool,
+    /// It was asked for, and not only drawn for the ones after it.
+    is_shown: bool,
+}
+
+/// A frame of a plan that the device is done with.
+pub(crate) struct Coming {
+    pub(crate) frame: u32,
+    pub(crate) shots: Vec<Shot>,
+    pub(crate) drawn: Arrived,
 }
 
 /// A frame of a plan.

@@ -19,6 +19,7 @@ pub use budget::{
 
 use crate::measure::chart::Measure;
 use crate::measure::volume::MediumName;
+use crate::utilisation::Utilisation;
 
 /// A report. In JSON, `of` names the kind of work.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -81,6 +82,9 @@ pub struct JobReport {
     pub seconds_to_first_frame: Option<f64>,
     /// Median over the frames drawn, of the time between two of them.
     pub seconds_per_frame: Option<f64>,
+    /// What was at work while frames were drawn; none if no frame was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub utilisation: Option<Utilisation>,
     /// Median over the frames drawn; empty where the device has no timestamps.
     pub gpu_milliseconds_per_pass: BTreeMap<String, f64>,
     /// Triangles of all heads.

@@ -1,7 +1,7 @@
 //! The main job: the frames of a plan to a folder, with everything that a review needs beside them.
 //!
 //! ```text
-//! Plan --draw--> frame n+1 | writers: frame n --> frame.0001.png, frame.0001.exr ...
+//! Plan --draw--> frames n+2, n+1 | writers: frame n --> frame.0001.png, frame.0001.exr ...
 //!                                        +--> contact_sheet.png, video.mp4, sequence.otio
 //! heads --------> animated_head.glb      job.json, stats.json --> review.html --> manifest.json
 //! ```
@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use image::RgbImage;
 use rubor_assets::{export, files};
-use rubor_renderer::footprint;
+use rubor_renderer::{FrameStats, footprint};
 
 use crate::claim::{self, Claim};
 use crate::error::{Failure, Fault, Outcome};
@@ -21,7 +21,7 @@ use crate::layers;
 use crate::manifest::{MANIFEST_FILE, Manifest};
 use crate::notes::{Note, summed};
 use crate::output;
-use crate::plan::{Plan, Shown};
+use crate::plan::{Coming, Plan};
 use crate::report::{AutoRun, JobReport, PassTimes, Report, median};
 use crate::review::inset::Inset;
 use crate::review::page::{self, FrameCost, PAGE_FILE, PageData};
@@ -29,6 +29,7 @@ use crate::review::timeline::{self, TIMELINE_FILE};
 use crate::review::{contact_sheet, text, video};
 use crate::stop::Stop;
 use crate::studio::{Frame, Studio};
+use crate::utilisation::{Clock, Work};
 use crate::watch::Watch;
 use crate::writers;
 
@@ -81,12 +82,17 @@ impl Destination {
 /// A frame for the writers.
 struct Page {
     place: usize,
-    shown: Shown,
+    /// From the frame before.
+    seconds: f64,
+    frame: Coming,
 }
 
 /// Results of the writers for a frame.
 struct Written {
     place: usize,
+    frame: u32,
+    seconds: f64,
+    stats: FrameStats,
     small: Option<RgbImage>,
 }
 
@@ -134,44 +140,58 @@ pub fn run(
         }
     }
 
-    let mut times = PassTimes::default();
     let mut first_frame_s = None;
-    let mut costs: BTreeMap<u32, FrameCost> = BTreeMap::new();
+    let mut costs: BTreeMap<u32, (f64, FrameStats)> = BTreeMap::new();
+    let clock = Clock::start();
     let write = |page: Page| -> Outcome<Written> {
-        let Page { place, shown: Shown { frame, shots, drawn } } = page;
-        let mut picture = drawn.picture();
-        if let (Some(inset), Some(shot)) = (&inset, shots.first()) {
-            inset.draw(&shot.face, &plan.settings(frame).quality, &mut picture);
-        }
-        save_channels(job, &to.folder, frame, &drawn)?;
+        let Page { place, seconds, frame: Coming { frame, shots, drawn } } = page;
+        let drawn = clock.time(Work::Read, || drawn.take())?;
+        let picture = clock.time(Work::Encode, || -> Outcome<RgbImage> {
+            let mut picture = drawn.picture();
+            if let (Some(inset), Some(shot)) = (&inset, shots.first()) {
+                inset.draw(&shot.face, &plan.settings(frame).quality, &mut picture);
+            }
+            Ok(picture)
+        })?;
         // Written last: if the picture of a frame exists, the frame is complete.
-        output::save_picture(&frame_path(&to.folder, frame), &picture)?;
+        for file in files_of(job, &to.folder, frame, &drawn, &picture) {
+            let (path, encode) = file;
+            let bytes = clock.time(Work::Encode, encode)?;
+            clock.time(Work::Write, || output::write(&path, &bytes))?;
+        }
         let small = on_sheet.contains(&(place as u32)).then(|| contact_sheet::reduce(&picture));
-        Ok(Written { place, small })
+        Ok(Written { place, frame, seconds, stats: drawn.stats, small })
     };
     let mut written = |written: Written| {
         done.insert(written.place);
         first_frame_s.get_or_insert_with(|| started.elapsed().as_secs_f64());
         sheet.extend(written.small.map(|small| (written.place, small)));
+        costs.insert(written.frame, (written.seconds, written.stats));
         watch.step();
     };
     let drawn = writers::beside(&write, &mut written, |push| {
         let mut since = Instant::now();
         stop_if_asked(&to.stop)?;
-        plan.draw(studio, &to_draw, |shown| {
+        plan.draw_ahead(studio, &to_draw, &clock, |frame| {
             // With the first frame, so that a job that cannot be drawn leaves nothing.
             notes.extend(claim.take()?);
             let seconds = since.elapsed().as_secs_f64();
             since = Instant::now();
-            let stats = &shown.drawn.stats;
-            times.add(stats);
-            let passes_ms = stats.passes_ms.iter().map(|(name, ms)| (*name, *ms)).collect();
-            costs.insert(shown.frame, FrameCost { seconds, passes_ms });
-            let place = plan.frames().partition_point(|f| *f < shown.frame);
-            push(Page { place, shown })?;
+            let place = plan.frames().partition_point(|f| *f < frame.frame);
+            push(Page { place, seconds, frame })?;
             stop_if_asked(&to.stop)
         })
     });
+    let mut times = PassTimes::default();
+    costs.values().for_each(|(_, stats)| times.add(stats));
+    let device_ms = studio.has_timestamps().then(|| costs.values().map(|(_, stats)| stats.frame_ms).sum());
+    let utilisation = (!costs.is_empty()).then(|| clock.utilisation(device_ms));
+    let costs: BTreeMap<u32, FrameCost> = costs
+        .into_iter()
+        .map(|(frame, (seconds, stats))| {
+            (frame, FrameCost { seconds, passes_ms: stats.passes_ms.into_iter().collect() })
+        })
+        .collect();
     if let Err(failure) = drawn {
         watch.end();
         return Err(with_way_on(failure, plan, &done, &to.folder));
@@ -238,6 +258,7 @@ pub fn run(
         frames_drawn: to_draw.len(),
         seconds_to_first_frame: first_frame_s,
         seconds_per_frame: median(&mut seconds),
+        utilisation,
         gpu_milliseconds_per_pass: times.medians(),
         triangles: times.triangles,
         device_memory_bytes: times.memory_bytes,
@@ -348,21 +369,36 @@ fn read_frame(job: &Job, folder: &Path, frame: u32, size: [u32; 2]) -> Option<Rg
     (image.dimensions() == (size[0], size[1])).then_some(image)
 }
 
-fn save_channels(job: &Job, folder: &Path, frame: u32, drawn: &Frame) -> Outcome {
+/// Makes the bytes of a file.
+type Encode<'a> = Box<dyn FnOnce() -> Outcome<Vec<u8>> + 'a>;
+
+/// The files of a frame, its picture last.
+fn files_of<'a>(
+    job: &'a Job,
+    folder: &Path,
+    frame: u32,
+    drawn: &'a Frame,
+    picture: &'a RgbImage,
+) -> Vec<(PathBuf, Encode<'a>)> {
     let output = &job.settings.output;
-    for data in drawn.channels.iter().filter(|data| output.channels.contains(&data.channel)) {
-        output::save_channel(&channel_path(folder, frame, &data.channel.name()), data)?;
+    let wanted = drawn.channels.iter().filter(|data| output.channels.contains(&data.channel));
+    let mut files: Vec<(PathBuf, Encode<'a>)> = wanted
+        .map(|data| -> (PathBuf, Encode<'a>) {
+            let path = channel_path(folder, frame, &data.channel.name());
+            (path, Box::new(|| output::encode_channel(data)))
+        })
+        .collect();
+    if job.format != Format::Png {
+        let about = layers::About {
+            size: output.size,
+            number: frame + 1,
+            fps: job.sequence.fps,
+            near_metres: rubor_renderer::NEAR_METRES,
+        };
+        files.push((layers_path(folder, frame), Box::new(move || layers::encode(&drawn.channels, &about))));
     }
-    if job.format == Format::Png {
-        return Ok(());
-    }
-    let about = layers::About {
-        size: output.size,
-        number: frame + 1,
-        fps: job.sequence.fps,
-        near_metres: rubor_renderer::NEAR_METRES,
-    };
-    layers::write(&layers_path(folder, frame), &drawn.channels, &about)
+    files.push((frame_path(folder, frame), Box::new(|| output::encode_png(picture))));
+    files
 }
 
 /// A frame in words: its number and time, then the expressions and states that show, the strongest first.

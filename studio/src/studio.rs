@@ -24,6 +24,7 @@ use rubor_rig::evaluate::{LightState, Shot};
 use rubor_rig::head::{Head, SkinMaps};
 use rubor_rig::skin::chromophores::{ChromophoreModel, SkinLookup, SkinModel};
 
+use crate::cache::{self, Cache};
 use crate::environment;
 use crate::error::{Failure, Outcome};
 use crate::notes::Note;
@@ -60,6 +61,7 @@ pub struct Studio {
     notes: Vec<Note>,
     /// Whether what turns triangles into pixels was chosen for these heads.
     raster_is_chosen: bool,
+    cache: Cache,
 }
 
 /// The last environment by its name: a rotated one is the same map at another angle.
@@ -70,6 +72,20 @@ pub struct Drawn {
     frame: rubor_renderer::Drawn,
     /// Channels that the frame has to have.
     channels: usize,
+}
+
+/// A frame that the device is done with.
+pub struct Arrived(rubor_renderer::Arrived);
+
+impl Arrived {
+    /// The frame: copies it out of memory of the device, on any thread.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn take(self) -> Outcome<Frame> {
+        let (image, stats, channels) = self.0.take()?;
+        Ok(Frame { image, stats, channels })
+    }
 }
 
 /// A finished frame.
@@ -108,7 +124,13 @@ impl Studio {
             surroundings: None,
             notes: Vec::new(),
             raster_is_chosen: false,
+            cache: Cache::default(),
         })
+    }
+
+    /// Keeps what takes seconds and follows from the heads alone, from the next heads on.
+    pub fn keep_in(&mut self, cache: Cache) {
+        self.cache = cache;
     }
 
     /// The device.
@@ -156,7 +178,7 @@ impl Studio {
                 Some(kept) => kept,
                 None => {
                     let on_gpu = HeadOnGpu::new(self.renderer.gpu(), head, &color)?;
-                    Rc::new(on_gpu.with_ladder(ladder(head)))
+                    Rc::new(on_gpu.with_ladder(ladder(head, &self.cache)))
                 }
             };
             known.push((head, on_gpu));
@@ -209,15 +231,23 @@ impl Studio {
     /// # Errors
     /// The device failed; the frame lacks a channel that its settings name.
     pub fn finish(&mut self, drawn: Drawn) -> Outcome<Frame> {
-        let (image, stats, channels) = native::wait(self.renderer.gpu(), drawn.frame.finish_with_channels())?;
-        if channels.len() < drawn.channels {
-            let found = channels.len();
+        self.arrive(drawn)?.take()
+    }
+
+    /// Waits until the device is done with a frame.
+    ///
+    /// # Errors
+    /// As [`Studio::finish`].
+    pub fn arrive(&mut self, drawn: Drawn) -> Outcome<Arrived> {
+        let arrived = native::wait(self.renderer.gpu(), drawn.frame.arrive())?;
+        let found = arrived.channels();
+        if found < drawn.channels {
             return Err(Failure::job(format!(
                 "channels: found {found}, expected {}: this frame does not have them all",
                 drawn.channels
             )));
         }
-        Ok(Frame { image, stats, channels })
+        Ok(Arrived(arrived))
     }
 
     /// Draws shots of heads side by side again and again, one frame right after the other, and returns the cost of each;
@@ -313,7 +343,7 @@ impl Studio {
 }
 
 /// Coarser levels of a head, made when they are needed.
-fn ladder(head: &Head) -> Ladder {
+fn ladder(head: &Head, cache: &Cache) -> Ladder {
     let hair =
         SkinMaps { hair: head.maps.hair.clone(), hair_count: head.maps.hair_count, ..SkinMaps::default() };
     let geometry = Head {
@@ -332,7 +362,9 @@ fn ladder(head: &Head) -> Ladder {
         landmarks: head.landmarks.clone(),
         provenance: Vec::new(),
     };
-    Ladder::new(Arc::new(geometry), levels::levels, levels::least_error_metres(head))
+    let cache = cache.clone();
+    let make = move |head: &Head| cache::levels(&cache, head);
+    Ladder::new(Arc::new(geometry), make, levels::least_error_metres(head))
 }
 
 /// The lens of a shot and where its backdrop is lit.

@@ -1,7 +1,5 @@
 //! Photon walks, stored between runs, in the user's cache folder.
 
-use std::path::PathBuf;
-
 use rubor_rig::error::SkinError;
 use rubor_rig::skin::medium::Medium;
 use rubor_rig::skin::monte_carlo::{AlbedoTable, TABLE_MAX_ALBEDO};
@@ -38,7 +36,7 @@ pub fn check(media: &[Medium; 3]) -> Result<(), SkinError> {
 /// # Errors
 /// The walk's numbers are out of range.
 pub fn table(anisotropy: f64, eta: f64, photons: u64) -> Outcome<(AlbedoTable, Option<Note>)> {
-    let file = cache_folder().map(|f| f.join(name(anisotropy, eta, photons)));
+    let file = crate::cache::folder().map(|f| f.join(name(anisotropy, eta, photons)));
     if let Some(kept) = file.as_ref().and_then(|f| read(f, anisotropy, eta)) {
         return Ok((kept, None));
     }
@@ -76,11 +74,6 @@ fn keep(file: &std::path::Path, table: &AlbedoTable) -> Outcome {
         output::folder(folder)?;
     }
     output::write(file, &serde_json::to_vec(table).map_err(Failure::job)?)
-}
-
-/// Cache folder of this system; `None` if the system does not name one.
-fn cache_folder() -> Option<PathBuf> {
-    directories::ProjectDirs::from("", "", "rubor").map(|dirs| dirs.cache_dir().to_owned())
 }
 
 #[cfg(test)]

@@ -91,6 +91,14 @@ fn a_small_job_makes_everything_and_resumes() {
     let kept: rubor::Report = serde_json::from_slice(&kept).expect("stats.json is a report");
     assert_eq!(serde_json::to_value(&kept).expect("JSON")["files"], stats["files"]);
     assert!(stats["triangles"].as_u64().is_some_and(|n| n > 10_000));
+    let at_work = &stats["utilisation"];
+    for what in ["evaluate", "record", "read", "encode", "write", "idle"] {
+        assert!(
+            at_work[what].as_f64().is_some_and(|share| (0.0..=1.0).contains(&share)),
+            "{what}: {at_work}"
+        );
+    }
+    assert!(at_work["seconds"].as_f64().is_some_and(|s| s > 0.0) && at_work["encode"].as_f64() > Some(0.0));
     let names = folder.names("out");
     for expected in [
         "animated_head.glb",

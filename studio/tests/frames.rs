@@ -80,6 +80,44 @@ fn every_order_gives_the_bytes_of_the_whole_run() {
 }
 
 #[test]
+fn frames_that_overlap_have_the_bytes_of_frames_one_by_one() {
+    if !can_draw() {
+        return;
+    }
+    let heads = [inputs::head(None).expect("the built-in head")];
+    let mut studio = Studio::open(None).expect("a device");
+    studio.set_heads([&heads[0].head]).expect("the head fits");
+    for antialias in [AntialiasMethod::None, AntialiasMethod::Smaa4x] {
+        let job = moving_job(&heads, antialias);
+        let plan = Plan::new(&job, &heads).expect("a plan");
+        studio.cut(0);
+        let alone: Vec<_> = (plan.frames().iter())
+            .map(|frame| {
+                let shots = plan.shots(*frame);
+                let drawn = studio.render(&shots, plan.spacing_m(), plan.settings(*frame));
+                (*frame, drawn.expect("a frame").image.rgba)
+            })
+            .collect();
+        assert!(drawn(&plan, &mut studio, plan.frames()) == alone, "{antialias}");
+        // Who takes them slowly gets the same, and no more wait than fit.
+        let mut slow = Vec::new();
+        plan.draw(&mut studio, plan.frames(), |shown| {
+            std::thread::sleep(std::time::Duration::from_millis(30));
+            slow.push((shown.frame, shown.drawn.image.rgba));
+            Ok(())
+        })
+        .expect("frames");
+        assert!(slow == alone, "{antialias}, slowly");
+        let mut taken = 0;
+        let stopped = plan.draw(&mut studio, plan.frames(), |_| {
+            taken += 1;
+            Err(rubor::Failure::job("enough"))
+        });
+        assert_eq!((taken, stopped.unwrap_err().to_string().as_str()), (1, "enough"));
+    }
+}
+
+#[test]
 fn parts_and_resumed_runs_make_the_same_files() {
     if !can_draw() {
         return;

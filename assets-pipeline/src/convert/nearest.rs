@@ -1,19 +1,12 @@
-//! The nearest place of a surface: triangles in a grid of cells.
+//! The nearest place of a surface.
 
-use std::collections::HashMap;
+use glam::Vec3;
+use rubor_rig::bvh::Bvh;
 
-use glam::{IVec3, Vec3};
-
-/// Cells along the longest side of the surface: some ten triangles each in a head.
-const CELLS: f32 = 48.0;
-
-/// Triangles in a grid.
+/// Triangles and their tree.
 pub(super) struct Surface {
     triangles: Vec<[Vec3; 3]>,
-    cells: HashMap<IVec3, Vec<u32>>,
-    cell: f32,
-    low: IVec3,
-    high: IVec3,
+    tree: Bvh,
 }
 
 /// A place of a surface.
@@ -30,68 +23,27 @@ pub(super) struct Place {
 impl Surface {
     /// `None` where there is no surface: no triangles, or all of them in one point.
     pub(super) fn new(triangles: Vec<[Vec3; 3]>) -> Option<Self> {
-        let corners = || triangles.iter().flatten().copied();
-        let (low, high) = (corners().reduce(Vec3::min)?, corners().reduce(Vec3::max)?);
-        let cell = (high - low).max_element() / CELLS;
-        if !(cell > 0.0 && cell.is_finite()) {
-            return None;
-        }
-        let mut surface = Self { triangles, cells: HashMap::new(), cell, low: IVec3::MAX, high: IVec3::MIN };
-        for (i, [a, b, c]) in surface.triangles.iter().enumerate() {
-            let (low, high) = (surface.cell_of(a.min(*b).min(*c)), surface.cell_of(a.max(*b).max(*c)));
-            for z in low.z..=high.z {
-                for y in low.y..=high.y {
-                    for x in low.x..=high.x {
-                        surface.cells.entry(IVec3::new(x, y, z)).or_default().push(i as u32);
-                    }
-                }
-            }
-            (surface.low, surface.high) = (surface.low.min(low), surface.high.max(high));
-        }
-        Some(surface)
+        let tree = Bvh::new(triangles.clone());
+        let (low, high) = tree.bounds();
+        let extent = (high - low).max_element();
+        (extent > 0.0 && extent.is_finite()).then_some(Self { triangles, tree })
     }
 
-    fn cell_of(&self, p: Vec3) -> IVec3 {
-        (p / self.cell).floor().as_ivec3()
-    }
-
-    /// The place nearest to a point.
+    /// The place nearest to a point; of several triangles that share it the first.
     pub(super) fn nearest(&self, p: Vec3) -> Place {
-        let middle = self.cell_of(p);
-        // Shells of cells about the point until no farther shell can hold anything nearer.
-        let inside = middle.clamp(self.low, self.high);
-        let first = (middle - inside).abs().max_element();
-        let last = first + (self.high - self.low).max_element() + 1;
         let mut best = Place { distance: f32::INFINITY, triangle: 0, weights: Vec3::X };
-        for shell in first..=last {
-            if best.distance <= (shell - 1).max(0) as f32 * self.cell {
-                break;
+        self.tree.nearest(p, |number| {
+            let triangle = number as usize;
+            let [a, b, c] = self.triangles[triangle];
+            let weights = nearest_in_triangle(p, a, b, c);
+            let distance = (a * weights.x + b * weights.y + c * weights.z).distance(p);
+            if distance < best.distance || (distance == best.distance && triangle < best.triangle) {
+                best = Place { distance, triangle, weights };
             }
-            for cell in shell_cells(shell).map(|c| middle + c) {
-                for i in self.cells.get(&cell).into_iter().flatten() {
-                    let triangle = *i as usize;
-                    let [a, b, c] = self.triangles[triangle];
-                    let weights = nearest_in_triangle(p, a, b, c);
-                    let distance = (a * weights.x + b * weights.y + c * weights.z).distance(p);
-                    if distance < best.distance {
-                        best = Place { distance, triangle, weights };
-                    }
-                }
-            }
-        }
+            distance
+        });
         best
     }
-}
-
-/// Offsets of the cells at a Chebyshev distance.
-fn shell_cells(n: i32) -> impl Iterator<Item = IVec3> {
-    (-n..=n).flat_map(move |z| {
-        (-n..=n).flat_map(move |y| {
-            let is_face = z.abs() == n || y.abs() == n;
-            let step = if is_face || n == 0 { 1 } else { 2 * n };
-            (-n..=n).step_by(step as usize).map(move |x| IVec3::new(x, y, z))
-        })
-    })
 }
 
 /// Barycentric weights of the point of a triangle nearest to `p`.
@@ -149,12 +101,6 @@ mod tests {
             assert_eq!(found.distance, expected);
             assert_eq!(of(&triangles[found.triangle]), expected);
         }
-    }
-
-    #[test]
-    fn shells_hold_each_cell_once() {
-        assert_eq!(shell_cells(2).count(), 5 * 5 * 5 - 27);
-        assert_eq!(shell_cells(0).count(), 1);
     }
 
     #[test]

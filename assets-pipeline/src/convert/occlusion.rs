@@ -50,6 +50,30 @@ pub const SHAPES: [(&str, Option<&str>); 21] = [
     ("browDownRight", None),
 ];
 
+/// Directions about +Z whose density is that of the cosine: a Hammersley set.
+pub struct Rays(Vec<Vec3>);
+
+impl Rays {
+    /// `count` directions.
+    pub fn new(count: u32) -> Self {
+        let direction = |k: u32| {
+            let u = (k as f32 + 0.5) / count as f32;
+            let (sin, cos) = (TAU * radical_inverse(k)).sin_cos();
+            let (r, z) = (u.sqrt(), (1.0 - u).sqrt());
+            Vec3::new(r * cos, r * sin, z)
+        };
+        Self((0..count).map(direction).collect())
+    }
+
+    /// The same about a normal, turned by `turn` (of 1).
+    fn about(&self, normal: Vec3, turn: f32) -> impl Iterator<Item = Vec3> {
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        let (sin, cos) = (TAU * turn).sin_cos();
+        let (x, y) = (cos * tangent + sin * bitangent, cos * bitangent - sin * tangent);
+        self.0.iter().map(move |d| d.x * x + d.y * y + d.z * normal)
+    }
+}
+
 /// The surfaces that hide the sky from the places of a mesh.
 ///
 /// Only opaque parts: not lashes, hair, wet shells and hidden ones.
@@ -61,35 +85,41 @@ pub struct Blockers {
 impl Blockers {
     /// The mesh with its points at `points`; `height` is that of the head, metres.
     pub fn new(mesh: &Mesh, points: &[Vec3], height: f32) -> Self {
-        let corners = |range: std::ops::Range<u32>| {
-            mesh.triangles[range.start as usize..range.end as usize]
-                .iter()
-                .map(|t| t.map(|v| points[mesh.vertices[v as usize].point as usize]))
-        };
-        let opaque = |m: Material| m.is_opaque();
-        let blockers = mesh.parts.iter().filter(|p| opaque(p.material));
-        let bvh = Bvh::new(blockers.flat_map(|p| corners(p.triangles.clone())).collect());
-        Self { bvh, near: START * height }
+        let triangles = blocking(mesh).map(|t| t.map(|p| points[p as usize])).collect();
+        Self { bvh: Bvh::new(triangles), near: START * height }
     }
 
-    /// Ambient visibility of a place with a normal, from `rays` rays whose pattern is turned by `turn` (of 1).
-    pub fn visibility(&self, place: Vec3, normal: Vec3, rays: u32, turn: f32) -> f32 {
-        let origin = place + self.near * normal;
-        let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let open = (0..rays).filter(|k| {
-            let u = (*k as f32 + 0.5) / rays as f32;
-            let phi = TAU * (radical_inverse(*k) + turn);
-            let (r, z) = (u.sqrt(), (1.0 - u).sqrt());
-            let direction = r * (phi.cos() * tangent + phi.sin() * bitangent) + z * normal;
-            !self.bvh.hit(origin, direction, self.near, f32::INFINITY)
-        });
-        open.count() as f32 / rays.max(1) as f32
+    /// The same surfaces in another pose of the mesh.
+    fn posed(&self, mesh: &Mesh, points: &[Vec3]) -> Self {
+        let triangles: Vec<[Vec3; 3]> = blocking(mesh).map(|t| t.map(|p| points[p as usize])).collect();
+        Self { bvh: self.bvh.posed(&triangles), near: self.near }
+    }
+
+    /// Ambient visibility of a place with a normal, from rays turned by `turn` (of 1).
+    pub fn visibility(&self, place: Vec3, normal: Vec3, rays: &Rays, turn: f32) -> f32 {
+        let open = rays.about(normal, turn).filter(|direction| self.sees(place, normal, *direction));
+        open.count() as f32 / rays.0.len().max(1) as f32
     }
 
     /// Whether a place with a normal sees the sky in a direction.
     pub fn sees(&self, place: Vec3, normal: Vec3, direction: Vec3) -> bool {
-        !self.bvh.hit(place + self.near * normal, direction, self.near, f32::INFINITY)
+        self.blocker(place, normal, direction).is_none()
     }
+
+    /// What hides the sky from a place with a normal in a direction.
+    fn blocker(&self, place: Vec3, normal: Vec3, direction: Vec3) -> Option<u32> {
+        self.bvh.any(place + self.near * normal, direction, self.near, f32::INFINITY)
+    }
+}
+
+/// Points of the triangles of opaque parts.
+fn blocking(mesh: &Mesh) -> impl Iterator<Item = [u32; 3]> {
+    let parts = mesh.parts.iter().filter(|p| p.material.is_opaque());
+    parts.flat_map(|p| {
+        mesh.triangles[p.triangles.start as usize..p.triangles.end as usize]
+            .iter()
+            .map(|t| t.map(|v| mesh.vertices[v as usize].point))
+    })
 }
 
 /// Fills `head.mesh.occlusion` with `rays` rays per point.
@@ -98,7 +128,7 @@ impl Blockers {
 /// cornea's edge stays even.
 pub fn bake(head: &mut Head, rays: u32) {
     let everywhere = vec![true; head.mesh.points.len()];
-    let raw = of_pose(head, &head.mesh.points, rays, &everywhere);
+    let raw = Traced::new(head, &head.mesh.points, &Rays::new(rays), &everywhere, None).visibility();
     head.mesh.occlusion = smooth(head, &raw);
 }
 
@@ -106,26 +136,36 @@ pub fn bake(head: &mut Head, rays: u32) {
 /// another counts on top of that. Points of eyes are left out: the renderer finds their lids in the picture.
 pub fn bake_shapes(head: &mut Head, rays: u32, names: &[(&str, Option<&str>)]) {
     let is_eye = points_of_eyes(head);
-    let rest = of_pose(head, &head.mesh.points, rays, &vec![true; is_eye.len()]);
-    for (name, base) in names {
-        let Some(index) = head.shape_index(name) else { continue };
-        let base = base.and_then(|b| head.shape_index(b));
-        let mut wanted = near_motion(head, index);
-        wanted.iter_mut().zip(&is_eye).for_each(|(wanted, eye)| *wanted &= !eye);
-        let at = |own: f32, other: f32| {
+    let rays = &Rays::new(rays);
+    let known: Vec<(usize, Option<usize>, Vec<bool>)> = names
+        .iter()
+        .filter_map(|(name, base)| {
+            let index = head.shape_index(name)?;
+            let mut wanted = near_motion(head, index);
+            wanted.iter_mut().zip(&is_eye).for_each(|(wanted, eye)| *wanted &= !eye);
+            Some((index, base.and_then(|b| head.shape_index(b)), wanted))
+        })
+        .collect();
+    let mut of_any = vec![false; is_eye.len()];
+    known.iter().for_each(|(.., wanted)| of_any.iter_mut().zip(wanted).for_each(|(any, one)| *any |= one));
+    let rest = Traced::new(head, &head.mesh.points, rays, &of_any, None);
+    for (index, base, wanted) in known {
+        let at = |own: f32, other: f32, from: &Traced| {
             let mut weights = vec![0.0; head.shapes.len()];
             base.into_iter().for_each(|b| weights[b] = other);
             weights[index] = own;
-            of_pose(head, &deform_points(&head.mesh, &head.shapes, &weights), rays, &wanted)
+            let points = deform_points(&head.mesh, &head.shapes, &weights);
+            Traced::new(head, &points, rays, &wanted, Some(from))
         };
-        let before = if base.is_some() { [at(0.0, 0.5), at(0.0, 1.0)] } else { [rest.clone(), rest.clone()] };
-        let after = [at(0.5, 0.5), at(1.0, 1.0)];
         // Smoothing is linear: that of differences is the difference.
-        let change = |k: usize| -> Vec<f32> {
-            let difference = |i: usize| if wanted[i] { after[k][i] - before[k][i] } else { 0.0 };
+        let change = |weight: f32| -> Vec<f32> {
+            let base = base.map(|_| at(0.0, weight, &rest));
+            let before = base.as_ref().unwrap_or(&rest);
+            let after = at(weight, weight, before);
+            let difference = |i: usize| if wanted[i] { after.open(i) - before.open(i) } else { 0.0 };
             smooth(head, &(0..wanted.len()).map(difference).collect::<Vec<f32>>())
         };
-        let changes = change(0).into_iter().zip(change(1)).enumerate();
+        let changes = change(0.5).into_iter().zip(change(1.0)).enumerate();
         let changes = changes.filter(|(i, _)| !is_eye[*i]).map(|(i, (at_half, at_full))| OcclusionChange {
             point: i as u32,
             at_half,
@@ -163,15 +203,78 @@ fn near_motion(head: &Head, shape: usize) -> Vec<bool> {
     head.mesh.points.iter().map(|p| cells.contains(&cell(*p))).collect()
 }
 
-/// Ambient visibility of the points that are asked for, 0 for others.
-fn of_pose(head: &Head, points: &[Vec3], rays: u32, wanted: &[bool]) -> Vec<f32> {
-    let blockers = Blockers::new(&head.mesh, points, head.height());
-    let normals = point_normals(&head.mesh, points);
-    let visibility = |i: usize| {
-        let turn = (i as u32).wrapping_mul(0x9E37_79B9) as f32 / 2_f32.powi(32);
-        if wanted[i] { blockers.visibility(points[i], normals[i], rays, turn) } else { 0.0 }
-    };
-    (0..points.len()).into_par_iter().map(visibility).collect()
+/// The sky is not hidden in a direction.
+const OPEN: u32 = u32::MAX;
+
+/// A pose of a head with what its points see.
+struct Traced {
+    blockers: Blockers,
+    points: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    /// What each ray of a point meets, by its place among the blocking triangles; empty for points that were not asked for.
+    met: Vec<Box<[u32]>>,
+}
+
+impl Traced {
+    /// Rays from the points that are asked for. Those of a pose from which this one differs in places, `from`, are taken over
+    /// where nothing moved: a point that kept place and normal sends the same rays, and what did not move hides the same of
+    /// them. The result is that of tracing all.
+    fn new(head: &Head, points: &[Vec3], rays: &Rays, wanted: &[bool], from: Option<&Self>) -> Self {
+        let mesh = &head.mesh;
+        let normals = point_normals(mesh, points);
+        let blockers = match from {
+            Some(from) => from.blockers.posed(mesh, points),
+            None => Blockers::new(mesh, points, head.height()),
+        };
+        let shared = from.map(|from| {
+            let has_moved = |p: &u32| from.points[*p as usize] != points[*p as usize];
+            let moved: Vec<bool> = blocking(mesh).map(|t| t.iter().any(has_moved)).collect();
+            let subset = blockers.bvh.subset(|t| moved[t as usize]);
+            (from, moved, subset)
+        });
+        let met_by = |i: usize| -> Box<[u32]> {
+            if !wanted[i] {
+                return Box::default();
+            }
+            let turn = (i as u32).wrapping_mul(0x9E37_79B9) as f32 / 2_f32.powi(32);
+            let (place, normal) = (points[i], normals[i]);
+            let of_all = |direction: Vec3| blockers.blocker(place, normal, direction).unwrap_or(OPEN);
+            let directions = rays.about(normal, turn);
+            match &shared {
+                Some((from, moved, subset)) if from.knows(i, place, normal) => {
+                    let origin = place + blockers.near * normal;
+                    let of_moved = |direction: Vec3| {
+                        blockers.bvh.any_of(subset, origin, direction, blockers.near, f32::INFINITY)
+                    };
+                    let again = |(direction, before): (Vec3, &u32)| match *before {
+                        OPEN => of_moved(direction).unwrap_or(OPEN),
+                        still if !moved[still as usize] => still,
+                        _ => of_all(direction),
+                    };
+                    directions.zip(&from.met[i]).map(again).collect()
+                }
+                _ => directions.map(of_all).collect(),
+            }
+        };
+        let met = (0..points.len()).into_par_iter().map(met_by).collect();
+        Self { blockers, points: points.to_vec(), normals, met }
+    }
+
+    /// Whether a point was asked for, and had this place and normal.
+    fn knows(&self, i: usize, place: Vec3, normal: Vec3) -> bool {
+        !self.met[i].is_empty() && self.points[i] == place && self.normals[i] == normal
+    }
+
+    /// Ambient visibility of a point; 0 if it was not asked for.
+    fn open(&self, i: usize) -> f32 {
+        let met = &self.met[i];
+        met.iter().filter(|m| **m == OPEN).count() as f32 / met.len().max(1) as f32
+    }
+
+    /// That of all points.
+    fn visibility(&self) -> Vec<f32> {
+        (0..self.met.len()).map(|i| self.open(i)).collect()
+    }
 }
 
 /// Van der Corput sequence in base 2.
@@ -270,6 +373,30 @@ mod tests {
     }
 
     #[test]
+    fn a_pose_that_shares_rays_sees_what_one_that_traces_all_sees() {
+        let head = under_a_lid();
+        let (rays, everywhere) = (Rays::new(64), vec![true; head.mesh.points.len()]);
+        let half: Vec<bool> = (0..head.mesh.points.len()).map(|i| i % 2 == 0).collect();
+        let traced = |weight: f32, wanted: &[bool], from: Option<&Traced>| {
+            let points = deform_points(&head.mesh, &head.shapes, &[weight]);
+            Traced::new(&head, &points, &rays, wanted, from)
+        };
+        let rest = traced(0.0, &everywhere, None);
+        let rest_of_half = traced(0.0, &half, None);
+        let mut changed = 0;
+        for weight in [0.0, 0.3, 1.0] {
+            let truth = traced(weight, &everywhere, None).visibility();
+            let shared = traced(weight, &everywhere, Some(&rest));
+            assert_eq!(shared.visibility(), truth, "{weight}");
+            // From a pose that knows some of the points, and back to rest.
+            assert_eq!(traced(weight, &everywhere, Some(&rest_of_half)).visibility(), truth, "{weight}");
+            assert_eq!(traced(0.0, &everywhere, Some(&shared)).visibility(), rest.visibility());
+            changed += truth.iter().zip(rest.visibility()).filter(|(a, b)| **a != *b).count();
+        }
+        assert!(changed > 20, "{changed} changes make a poor test");
+    }
+
+    #[test]
     fn changes_at_rest_and_at_their_weights_are_those_of_the_posed_head() {
         let mut head = under_a_lid();
         bake(&mut head, 512);
@@ -281,7 +408,8 @@ mod tests {
         for weight in [0.5f32, 1.0] {
             posed.mesh.points = deform_points(&head.mesh, &head.shapes, &[weight]);
             let everywhere = vec![true; posed.mesh.points.len()];
-            let truth = smooth(&head, &of_pose(&head, &posed.mesh.points, 512, &everywhere));
+            let traced = Traced::new(&head, &posed.mesh.points, &Rays::new(512), &everywhere, None);
+            let truth = smooth(&head, &traced.visibility());
             let blended = blend_occlusion(&head.mesh, &head.shapes, &[weight]);
             let near = near_motion(&head, 0);
             assert!(near[..81].iter().all(|n| *n));

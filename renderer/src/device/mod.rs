@@ -22,4 +22,5 @@ pub use gpu::{AdapterDescription, Gpu};
 pub(crate) use images::{Image, ImageSpec, Images};
 pub(crate) use kernel::{Bind, Kernel, Raster, RasterKernel};
 pub(crate) use recorder::{Attachments, Draw, Recorder, color_attachment, depth_attachment};
+pub(crate) use timer::Ticks;
 pub use timer::{FrameTimes, PassTimer, PendingTimes};

@@ -11,9 +11,18 @@ pub(crate) struct Readback {
     staging: wgpu::Buffer,
 }
 
-/// A copy of a texture.
-pub(crate) struct TextureReadback {
-    bytes: Readback,
+/// A copy that was asked for, and arrives when the device is done.
+pub(crate) struct Coming {
+    staging: wgpu::Buffer,
+    receiver: oneshot::Receiver<Result<(), wgpu::BufferAsyncError>>,
+}
+
+/// A copy that the host can read now.
+pub(crate) struct Mapped(wgpu::Buffer);
+
+/// A copy of a texture: a [`Readback`], [`Coming`] or [`Mapped`] buffer.
+pub(crate) struct TextureReadback<B = Readback> {
+    bytes: B,
     row: u32,
     padded: u32,
     /// Columns and rows.
@@ -44,20 +53,48 @@ impl Readback {
         &self.staging
     }
 
-    /// Its bytes. The commands that fill it must have been submitted.
-    ///
-    /// # Errors
-    /// The device failed.
-    pub(crate) async fn read(self) -> Result<Vec<u8>, RenderError> {
+    /// Asks for its bytes. The commands that fill it must have been submitted.
+    pub(crate) fn ask(self) -> Coming {
         let (sender, receiver) = oneshot::channel();
         self.staging.map_async(wgpu::MapMode::Read, .., |result| {
             // The receiver may have been dropped.
             let _ = sender.send(result);
         });
-        let lost = |reason: String| RenderError::Lost(reason);
-        receiver.await.map_err(|e| lost(e.to_string()))?.map_err(|e| lost(e.to_string()))?;
-        let bytes = self.staging.get_mapped_range(..).map_err(|e| lost(e.to_string()))?.to_vec();
-        self.staging.unmap();
+        Coming { staging: self.staging, receiver }
+    }
+
+    /// Its bytes. The commands that fill it must have been submitted.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub(crate) async fn read(self) -> Result<Vec<u8>, RenderError> {
+        self.ask().arrive().await?.bytes()
+    }
+}
+
+fn lost(error: impl std::fmt::Display) -> RenderError {
+    RenderError::Lost(error.to_string())
+}
+
+impl Coming {
+    /// Waits for it.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub(crate) async fn arrive(self) -> Result<Mapped, RenderError> {
+        self.receiver.await.map_err(lost)?.map_err(lost)?;
+        Ok(Mapped(self.staging))
+    }
+}
+
+impl Mapped {
+    /// Its bytes; any thread may take them.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub(crate) fn bytes(self) -> Result<Vec<u8>, RenderError> {
+        let bytes = self.0.get_mapped_range(..).map_err(lost)?.to_vec();
+        self.0.unmap();
         Ok(bytes)
     }
 }
@@ -84,12 +121,44 @@ impl TextureReadback {
         Self { bytes, row, padded, size: [texture.width(), texture.height()] }
     }
 
+    /// Asks for its texels. The commands that fill it must have been submitted.
+    pub(crate) fn ask(self) -> TextureReadback<Coming> {
+        self.with(Readback::ask)
+    }
+
     /// Its texels, rows tightly packed. The commands that fill it must have been submitted.
     ///
     /// # Errors
     /// The device failed.
     pub(crate) async fn read(self) -> Result<Vec<u8>, RenderError> {
-        let bytes = self.bytes.read().await?;
+        self.ask().arrive().await?.texels()
+    }
+}
+
+impl<B> TextureReadback<B> {
+    fn with<C>(self, step: impl FnOnce(B) -> C) -> TextureReadback<C> {
+        TextureReadback { bytes: step(self.bytes), row: self.row, padded: self.padded, size: self.size }
+    }
+}
+
+impl TextureReadback<Coming> {
+    /// Waits for it.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub(crate) async fn arrive(self) -> Result<TextureReadback<Mapped>, RenderError> {
+        let TextureReadback { bytes, row, padded, size } = self;
+        Ok(TextureReadback { bytes: bytes.arrive().await?, row, padded, size })
+    }
+}
+
+impl TextureReadback<Mapped> {
+    /// Its texels, rows tightly packed; any thread may take them.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub(crate) fn texels(self) -> Result<Vec<u8>, RenderError> {
+        let bytes = self.bytes.bytes()?;
         if self.row == self.padded {
             return Ok(bytes);
         }

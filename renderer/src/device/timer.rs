@@ -1,7 +1,7 @@
 //! GPU time of passes, by timestamps that the device writes at their beginning and end.
 
 use super::gpu::Gpu;
-use super::readback::Readback;
+use super::readback::{Coming, Mapped, Readback};
 use crate::error::RenderError;
 
 /// Milliseconds of one frame on the GPU.
@@ -22,9 +22,12 @@ pub struct PassTimer {
 }
 
 /// The times of a recorded frame.
-pub struct PendingTimes {
+pub struct PendingTimes(Ticks<Readback>);
+
+/// Times as ticks in a [`Readback`], [`Coming`] or [`Mapped`] buffer.
+pub(crate) struct Ticks<B> {
     names: Vec<&'static str>,
-    ticks: Option<Readback>,
+    ticks: Option<B>,
     period_ns: f64,
 }
 
@@ -118,22 +121,49 @@ impl PassTimer {
             }
             readback
         });
-        PendingTimes {
-            names: self.names.clone(),
-            ticks,
-            period_ns: f64::from(gpu.queue.get_timestamp_period()),
-        }
+        let period_ns = f64::from(gpu.queue.get_timestamp_period());
+        PendingTimes(Ticks { names: self.names.clone(), ticks, period_ns })
     }
 }
 
 impl PendingTimes {
+    /// Asks for the times; the frame must have been submitted.
+    pub(crate) fn ask(self) -> Ticks<Coming> {
+        let Ticks { names, ticks, period_ns } = self.0;
+        Ticks { names, ticks: ticks.map(Readback::ask), period_ns }
+    }
+
     /// The times, once the device is done with the frame; no passes on a device without timestamps.
     ///
     /// # Errors
     /// The device failed.
     pub async fn read(self) -> Result<FrameTimes, RenderError> {
+        self.ask().arrive().await?.times()
+    }
+}
+
+impl Ticks<Coming> {
+    /// Waits for them.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub(crate) async fn arrive(self) -> Result<Ticks<Mapped>, RenderError> {
+        let ticks = match self.ticks {
+            Some(ticks) => Some(ticks.arrive().await?),
+            None => None,
+        };
+        Ok(Ticks { names: self.names, ticks, period_ns: self.period_ns })
+    }
+}
+
+impl Ticks<Mapped> {
+    /// The times; no passes on a device without timestamps.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub(crate) fn times(self) -> Result<FrameTimes, RenderError> {
         let Some(ticks) = self.ticks else { return Ok(FrameTimes::default()) };
-        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&ticks.read().await?);
+        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(&ticks.bytes()?);
         let ms = |ticks: u64| ticks as f64 * self.period_ns * 1e-6;
         let pairs = ticks.chunks_exact(2);
         let first = pairs.clone().map(|t| t[0]).min().unwrap_or(0);

@@ -110,10 +110,12 @@ pub(crate) struct Surface {
     pub(crate) triangles: Vec<[u32; 4]>,
 }
 
+type MakeLevels = Box<dyn Fn(&Head) -> Vec<Level> + Send + Sync>;
+
 /// How coarser levels of a head are made.
 pub struct Ladder {
     head: Arc<Head>,
-    make: fn(&Head) -> Vec<Level>,
+    make: MakeLevels,
     least_error_metres: f32,
     /// Coarser geometry with the maps of the head and how far it is off, metres, finest first.
     levels: OnceLock<Vec<(f32, HeadOnGpu)>>,
@@ -122,8 +124,12 @@ pub struct Ladder {
 impl Ladder {
     /// `make` returns levels of `head`, finest first, none of which is off by less than `least_error_metres`. Of the maps of
     /// `head` only that of hair is read.
-    pub fn new(head: Arc<Head>, make: fn(&Head) -> Vec<Level>, least_error_metres: f32) -> Self {
-        Self { head, make, least_error_metres, levels: OnceLock::new() }
+    pub fn new(
+        head: Arc<Head>,
+        make: impl Fn(&Head) -> Vec<Level> + Send + Sync + 'static,
+        least_error_metres: f32,
+    ) -> Self {
+        Self { head, make: Box::new(make), least_error_metres, levels: OnceLock::new() }
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use rubor::measure::bench::{self, Crowd, Frames};
 use rubor::measure::file_name;
 use rubor::report::BenchRow;
-use rubor::{Outcome, Report, Studio, inputs, output, plan};
+use rubor::{Outcome, Report, inputs, output, plan};
 use rubor_renderer::MAX_HEADS;
 use rubor_rig::evaluate::Evaluator;
 use rubor_rig::timeline::{Camera, Framing};
@@ -75,7 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     }
     let (evaluator, _) = Evaluator::new(&loaded.head, &rig, &sequence)?;
     let shot = evaluator.at(arguments.time);
-    let mut studio = Studio::open(arguments.adapter.as_deref())?;
+    let mut studio = super::open_studio(arguments.adapter.as_deref())?;
     if let Some(folder) = &arguments.output {
         output::folder(folder)?;
     }

@@ -7,7 +7,7 @@ use rubor::measure::budget::{self, Budget, Options, Scene};
 use rubor::measure::chart::Timing;
 use rubor::notes::Note;
 use rubor::report::{BudgetError, BudgetFate, BudgetItem, BudgetKind, BudgetReport};
-use rubor::{Failure, Outcome, Report, Studio, Watch, inputs, output};
+use rubor::{Failure, Outcome, Report, Watch, inputs, output};
 use rubor_renderer::settings::Settings;
 use rubor_rig::timeline::Sequence;
 
@@ -103,7 +103,7 @@ pub(crate) fn run(arguments: &Arguments, files: &[PathBuf], json: bool) -> Outco
     }
     let input_bytes = inputs::head_file_bytes(arguments.head.as_deref())?;
     let scene = Scene { head: loaded.head, input_bytes, rig, sequences };
-    let mut studio = Studio::open(arguments.adapter.as_deref())?;
+    let mut studio = super::open_studio(arguments.adapter.as_deref())?;
     let options =
         Options {
             bound: arguments.max_error.unwrap_or(Bound::Flip(BOUND)),

@@ -129,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         }
         return measure_volume(arguments, &loaded.head, &rig, &base, &listed);
     }
-    let mut studio = Studio::open(arguments.adapter.as_deref())?;
+    let mut studio = super::open_studio(arguments.adapter.as_deref())?;
     let is_quick = arguments.suite.as_deref().map_or(studio.is_software(), |name| name == "quick");
     let (suite, [batches, samples, frames]) =
         if is_quick { (Suite::Quick, [8, 4, 2]) } else { (Suite::Whole, [64, 8, 20]) };
@@ -245,7 +245,7 @@ fn measure_volume(
         say!("{}", folder.display());
         return Ok(());
     }
-    let mut studio = Studio::open(arguments.adapter.as_deref())?;
+    let mut studio = super::open_studio(arguments.adapter.as_deref())?;
     let [batches, paths] = if suite == Suite::Quick { [8, 64] } else { [16, 256] };
     let batches = arguments.batches.unwrap_or(batches);
     ScatterMethod::ReferenceSurface(batches).validate().map_err(Failure::input)?;

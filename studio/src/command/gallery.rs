@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use rubor::{Outcome, Report, Studio, Watch, gallery, output};
+use rubor::{Outcome, Report, Watch, gallery, output};
 
 use super::console::Progress;
 use super::print_json;
@@ -37,7 +37,7 @@ impl Purpose for Pictures {
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let settings = arguments.settings.settings(None)?;
-    let mut studio = Studio::open(arguments.adapter.as_deref())?;
+    let mut studio = super::open_studio(arguments.adapter.as_deref())?;
     output::folder(&arguments.output)?;
     let mut progress = Progress::default();
     let drawn = gallery::run(&mut studio, &settings, arguments.data.as_deref(), &mut progress);

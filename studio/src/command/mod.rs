@@ -5,7 +5,8 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use rubor::{Failure, Fault, Outcome};
+use rubor::cache::Cache;
+use rubor::{Failure, Fault, Outcome, Studio};
 use rubor_rig::limits::Limits;
 
 #[macro_use]
@@ -160,6 +161,13 @@ pub(crate) fn without_desktop_noise() {
         // `exec` returns only if it fails; then the command continues with the warning.
         let _ = std::process::Command::new(program).arg0(name).args(arguments).env(SILENCE, "1").exec();
     }
+}
+
+/// A studio that keeps what takes long in the folder of the user.
+fn open_studio(adapter: Option<&str>) -> Outcome<Studio> {
+    let mut studio = Studio::open(adapter)?;
+    studio.keep_in(Cache::of_user());
+    Ok(studio)
 }
 
 /// JSON on standard output.

@@ -215,7 +215,7 @@ impl Shared {
         let (sequence, _) = inputs::sequence(None)?;
         let mut job = Job::new(&heads, inputs::rig(None, heads[0].rig.clone())?, sequence)?;
         job.settings = self.changes.settings.settings(job.sequence.size)?;
-        let studio = Studio::open(self.results.adapter.as_deref())?;
+        let studio = super::open_studio(self.results.adapter.as_deref())?;
         if self.changes.settings.preset().is_none() && studio.is_software() {
             job.settings.quality = Preset::Draft.quality();
             let [width, height] = std::mem::replace(&mut job.settings.output.size, PREVIEW);
@@ -244,7 +244,7 @@ impl Results {
         chunks: Option<PathBuf>,
     ) -> Outcome {
         let plan = Plan::new(job, heads)?;
-        self.draw(&plan, Studio::open(self.adapter.as_deref())?, resume, chunks)
+        self.draw(&plan, super::open_studio(self.adapter.as_deref())?, resume, chunks)
     }
 
     fn draw(&self, plan: &Plan<'_>, mut studio: Studio, resume: bool, chunks: Option<PathBuf>) -> Outcome {
@@ -265,6 +265,9 @@ impl Results {
             return print_json(&Report::Job(report));
         }
         say!("{} frames in {}", report.frames, self.output.display());
+        if let Some(utilisation) = &report.utilisation {
+            say!("at work in {utilisation}");
+        }
         Ok(())
     }
 }

@@ -152,8 +152,13 @@ pub fn export(head: &Head, options: &Options<'_>) -> Result<Exported, ExportErro
     };
     let (primitives, parts) = geometry::primitives(head, &kept, &targets, &mut buffer);
     let factor = colors.as_ref().map_or(1.0, |c| 1.0 / c.rest);
-    let mut materials = materials::write(head, options, factor, &mut buffer)?;
-    let maps = maps::write(&head.maps, &options.maps, materials.albedo.clone(), &mut buffer)?;
+    // Most of the time goes into the coding of images.
+    let (encoded, materials) = rayon::join(
+        || maps::encode(&head.maps, &options.maps),
+        || materials::write(head, options, factor, &mut buffer),
+    );
+    let (encoded, mut materials) = (encoded?, materials?);
+    let maps = maps::write(&head.maps, &options.maps, materials.albedo.clone(), encoded, &mut buffer)?;
     let occlusion = (!head.mesh.occlusion.is_empty()).then(|| buffer.normalized(&head.mesh.occlusion) as u32);
     let shape_occlusion = (kept.iter().map(|s| &head.shapes[*s]).filter(|s| !s.occlusion.is_empty()))
         .map(|shape| {

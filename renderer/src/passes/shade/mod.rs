@@ -72,6 +72,10 @@
 //! skin, the environment by a table (`ggx_albedo`), and of the extensions of glTF ior, specular, clearcoat and transmission
 //! through thin walls. What is seen through is lit layer by layer (`see_through`) with the same code.
 //!
+//! A software device runs every invocation through the whole shader, whatever it branches around: Mesa 22.3's turns branches
+//! into masks. There `tiles.wesl` lists the tiles of 8 x 8 pixels in which there is something to shade, those of skin alone
+//! apart, for which all else is left out of the kernel ([`Tiles`]). The light is the same to the bit.
+//!
 //! Does not: reflect one part of the head in another; carry light between parts of an eye or the mouth.
 
 #[cfg(test)]
@@ -105,6 +109,7 @@ use crate::settings::{ColorMethod, Quality, SpecularMethod, WrinkleMethod};
 
 const SHADER: Module = module!("shade", "shade.wesl");
 const SAMPLES_SHADER: Module = module!("shade_light_samples", "light_samples.wesl");
+const TILES_SHADER: Module = module!("shade_tiles", "tiles.wesl");
 const AUTHORED_SHADER: Module = module!("shade_authored", "authored.wesl");
 const PARTS: [Module; 3] = [
     module!("shade_eye", "eye.wesl"),
@@ -125,6 +130,16 @@ pub(crate) fn program() -> Program {
 /// The shader of the pass that lights points of the surface.
 pub(crate) fn samples_program(with_normals: bool) -> Program {
     with_constants(Program::new(SAMPLES_SHADER).with(&[SHADER]).flag("normals", with_normals))
+}
+
+/// The shader that lists tiles.
+pub(crate) fn tiles_program() -> Program {
+    importing(TILES_SHADER, None)
+}
+
+/// The shader of the pass for listed tiles: of skin alone, or of anything.
+pub(crate) fn listed_program(only_skin: bool) -> Program {
+    program().flag("listed", true).flag("only_skin", only_skin)
 }
 
 /// The shader of the pass that lights what keeps the material of its author.
@@ -317,9 +332,59 @@ struct AuthoredKernels {
     white: wgpu::TextureView,
 }
 
+/// Workgroups that share the tiles of a list; each runs once more than it has tiles.
+const TILE_GROUPS: u32 = 32;
+
+/// Pipelines for tiles that have something to shade.
+struct Tiles {
+    list: Kernel,
+    skin: Kernel,
+    other: Kernel,
+}
+
+impl Tiles {
+    fn new(gpu: &Gpu, stored_shadows: bool) -> Self {
+        let of = |only_skin: bool| {
+            let program = listed_program(only_skin).flag("stored_shadows", stored_shadows);
+            Kernel::new(gpu, "shade", &program, "shade")
+        };
+        Self {
+            list: Kernel::new(gpu, "shade tiles", &tiles_program(), "list_tiles"),
+            skin: of(true),
+            other: of(false),
+        }
+    }
+
+    /// Shades the windows of heads: `each` has the resources of a head and the tiles of its window across and down.
+    fn record(&self, r: &mut Recorder<'_>, each: Vec<(Vec<Resource<'_>>, [u32; 3])>) {
+        let each: Vec<_> = each.into_iter().filter(|(_, [x, y, _])| x * y > 0).collect();
+        let lists: Vec<[wgpu::Buffer; 2]> = each
+            .iter()
+            .map(|(_, [x, y, _])| {
+                let bytes = 4 * (1 + u64::from(x * y));
+                ["tiles of skin", "other tiles"].map(|label| r.gpu.storage_zeroed(label, bytes))
+            })
+            .collect();
+        let listing = each.iter().zip(&lists).map(|((resources, [x, y, _]), [skin, other])| {
+            let lists = [("skin_tiles", skin.bound()), ("other_tiles", other.bound())];
+            ([resources.as_slice(), &lists].concat(), [(x * y).div_ceil(64), 1, 1])
+        });
+        r.dispatch_each(&self.list, listing.collect::<Vec<_>>());
+        for (kernel, list) in [(&self.skin, 0), (&self.other, 1)] {
+            let of = each.iter().zip(&lists).map(|((resources, _), lists)| {
+                let tiles = [("tiles", lists[list].bound())];
+                ([resources.as_slice(), &tiles].concat(), [TILE_GROUPS, 1, 1])
+            });
+            r.dispatch_each(kernel, of.collect::<Vec<_>>());
+        }
+    }
+}
+
 /// The pipelines of the pass.
 pub(crate) struct Shade {
     kernel: Kernel,
+    /// On software devices.
+    tiles: Option<Tiles>,
     /// Made by the first frame that lights points of the surface.
     samples_kernel: Option<(bool, Kernel)>,
     /// Variants of the kernel for the rules of diffusion methods, by their names, each made by the first frame with it.
@@ -355,6 +420,7 @@ impl Shade {
             directional_albedo: (specular, upload_directional_albedo(gpu, specular)),
             own_albedo: None,
             kernel: Kernel::new(gpu, "shade", &program, "shade"),
+            tiles: gpu.is_software().then(|| Tiles::new(gpu, stored_shadows)),
             samples_kernel: None,
             stored_shadows,
             skin_light_kernels: Mutex::default(),
@@ -374,6 +440,12 @@ impl Shade {
             black_array: texture::array_view(&black),
             black,
         }
+    }
+
+    /// Shades whole windows, as on other devices.
+    #[cfg(test)]
+    pub(crate) fn forget_tiles(&mut self) {
+        self.tiles = None;
     }
 
     /// Makes the resources of the specular method, and of skin with a colour by itself if there is any.
@@ -442,7 +514,10 @@ impl Shade {
             .iter()
             .zip(&params)
             .map(|(h, params)| (resources(h, params), lighting.seen.groups(h.index)));
-        r.dispatch_each(lighting.skin_light.map_or(&self.kernel, SkinLight::kernel), each);
+        match (&self.tiles, lighting.skin_light) {
+            (Some(tiles), None) => tiles.record(r, each.collect()),
+            (_, rule) => r.dispatch_each(rule.map_or(&self.kernel, SkinLight::kernel), each),
+        }
         if heads.iter().all(|h| h.head.authored.is_none()) {
             return lit;
         }

@@ -409,3 +409,60 @@ fn relief_that_was_given_has_the_slopes_of_its_map() {
         light_over_flat(&head, scale);
     }
 }
+
+#[test]
+fn tiles_that_are_listed_get_the_light_of_whole_windows() {
+    let Some(mut renderer) = renderer() else { return };
+    if !renderer.gpu().is_software() {
+        crate::testing::skipped("tiles are listed on software devices alone");
+        return;
+    }
+    let mut head = dome();
+    let triangles = head.mesh.triangles.len() as u32;
+    let materials = [Material::Skin, Material::Eye, Material::Teeth, Material::Gums, Material::Skin];
+    let ends = [0, 30, 33, 40, 47, 92].map(|part| part * triangles / 92);
+    head.mesh.parts = (materials.iter().zip(ends.windows(2)))
+        .map(|(material, end)| Part {
+            name: format!("{material:?}"),
+            material: *material,
+            triangles: end[0]..end[1],
+        })
+        .collect();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("it uploads");
+    let state = FaceState { shapes: vec![0.1, 0.6], ..FaceState::neutral(&head) };
+    let at = |x: f32| HeadInstance {
+        head: &on_gpu,
+        state: &state,
+        world_from_head: Mat4::from_translation(Vec3::new(x, 0.03, 0.0)),
+    };
+    let sky = EnvironmentMap { width: 8, height: 4, texels: vec![Vec3::splat(0.4); 32] };
+    let sky = sky.upload(renderer.gpu());
+    let lamps = [-0.6f32, 0.5].map(|x| Light {
+        kind: LightKind::Directional { direction: Vec3::new(x, -0.3, -1.0) },
+        color_linear: Vec3::new(2.0, 1.5, 1.0),
+        radius: 0.05,
+        casts_shadow: true,
+    });
+    let scene = Scene {
+        heads: &[at(-0.1), at(0.12)],
+        camera: Camera { position: 0.9 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 32.0 },
+        lights: &lamps,
+        environment: Some(&sky),
+        environment_rotation: 0.3,
+        environment_intensity: 1.0,
+        background_linear: Vec3::ZERO,
+    };
+    let mut settings = settings([107, 83]);
+    settings.quality.antialias = crate::settings::AntialiasMethod::SmaaS2x;
+    settings.output.channels = vec![Channel::Irradiance, Channel::Albedo, Channel::Direct];
+    let light = |renderer: &mut Renderer| {
+        let picture = render(renderer, &scene, &settings).expect("it draws").0;
+        let channels = settings.output.channels.iter();
+        (picture, channels.map(|c| read(renderer, *c).values).collect::<Vec<_>>())
+    };
+    let listed = light(&mut renderer);
+    let lit = listed.0.rgba.chunks(4).filter(|p| p[0] > 20).count();
+    assert!((1000..6000).contains(&lit), "{lit} pixels of the picture are lit");
+    renderer.shade().forget_tiles();
+    assert!(light(&mut renderer) == listed, "the light is the same to the bit");
+}
