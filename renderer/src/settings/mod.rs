@@ -30,7 +30,7 @@ use crate::channels::Channel;
 pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
-    AntialiasMethod, ColorMethod, CurvatureMethod, DetailMethod, GROUPS, Group, Method, RasterMethod,
+    AntialiasMethod, BounceMethod, ColorMethod, CurvatureMethod, DetailMethod, GROUPS, Group, Method, RasterMethod,
     ScatterMethod, SpecularMethod, Stage, ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
@@ -72,6 +72,8 @@ pub struct Quality {
     pub scatter: ScatterMethod,
     /// How light passes through thin parts
     pub transmit: TransmitMethod,
+    /// Light from one place of a head on another
+    pub bounce: BounceMethod,
     /// Where pre-integrated scattering takes the curvature of the skin from
     pub curvature: CurvatureMethod,
     /// Whether the blood of a face moves
@@ -175,6 +177,7 @@ impl Default for Quality {
         Self {
             scatter: ScatterMethod::Separable(17),
             transmit: TransmitMethod::ShadowDepth,
+            bounce: BounceMethod::Patches,
             curvature: CurvatureMethod::Mesh,
             color: ColorMethod::Hemoglobin,
             wrinkles: WrinkleMethod::PartialDerivative,

@@ -124,10 +124,11 @@ pub fn run(
     watch: &mut dyn Watch,
 ) -> Outcome<VolumeReport> {
     let flesh = options.medium.flesh()?;
-    let head = skin::bare_head(head);
-    studio.set_heads([&head])?;
-    let color = skin::bare_color(studio.skin());
     let [flat, _] = flat_reflectance(&flesh, 1.0, FLAT_PATHS, SEED);
+    let fractions = skin::fractions_of(flat, studio.skin());
+    let head = skin::bare_head(head, fractions);
+    studio.set_heads([&head])?;
+    let color = skin::bare_color(fractions, studio.skin());
     let size = base.output.size;
     let mut report = VolumeReport {
         adapter: studio.adapter(),
