@@ -100,7 +100,13 @@ impl Exchange {
                 }
                 let [u, v] = met.uv;
                 let w = 1.0 - u - v;
-                let nearest = if u > v && u > w { 1 } else if v > w { 2 } else { 0 };
+                let nearest = if u > v && u > w {
+                    1
+                } else if v > w {
+                    2
+                } else {
+                    0
+                };
                 *seen = patch_of[corners[nearest] as usize];
             }
             seen
@@ -142,13 +148,7 @@ fn cosine_weighted(k: usize, turn: f32) -> Vec3 {
 }
 
 /// Cuts points in halves across the longest side of their keys until there are `parts`, and adds the end of each.
-fn cut(
-    points: &mut [u32],
-    key: &impl Fn(u32) -> [f32; 6],
-    parts: usize,
-    start: u32,
-    ends: &mut Vec<u32>,
-) {
+fn cut(points: &mut [u32], key: &impl Fn(u32) -> [f32; 6], parts: usize, start: u32, ends: &mut Vec<u32>) {
     if parts < 2 || points.len() < 2 * LEAST_POINTS {
         if !points.is_empty() {
             ends.push(start + points.len() as u32);
@@ -163,9 +163,8 @@ fn cut(
     }
     let longest = (0..6).fold(0, |best, i| if high[i] - low[i] > high[best] - low[best] { i } else { best });
     let middle = points.len() / 2;
-    points.select_nth_unstable_by(middle, |a, b| {
-        key(*a)[longest].total_cmp(&key(*b)[longest]).then(a.cmp(b))
-    });
+    points
+        .select_nth_unstable_by(middle, |a, b| key(*a)[longest].total_cmp(&key(*b)[longest]).then(a.cmp(b)));
     let (first, second) = points.split_at_mut(middle);
     cut(first, key, parts / 2, start, ends);
     cut(second, key, parts / 2, start + middle as u32, ends);
@@ -202,7 +201,8 @@ mod tests {
         assert_eq!(exchange.patch_points.len(), points.len());
         // The lower square shines.
         let half = points.len() / 2;
-        let shining: Vec<Vec3> = (0..points.len()).map(|p| if p < half { Vec3::ONE } else { Vec3::ZERO }).collect();
+        let shining: Vec<Vec3> =
+            (0..points.len()).map(|p| if p < half { Vec3::ONE } else { Vec3::ZERO }).collect();
         let patches = exchange.averaged(&shining);
         assert!(patches.iter().all(|v| *v == Vec3::ONE || *v == Vec3::ZERO), "a patch has one normal");
         let found = exchange.gathered(&patches);
@@ -214,7 +214,8 @@ mod tests {
         // the border count as much as inner ones here, so the mean over points is a little lower.
         assert!((mean(half..2 * half) - 0.1998).abs() < 0.006, "{}", mean(half..2 * half));
         let middle = half + (N / 2 * (N + 1) + N / 2) as usize;
-        let near: Vec<usize> = (0..9).map(|i| middle + i % 3 - 1 + (i / 3) * (N as usize + 1) - (N as usize + 1)).collect();
+        let near: Vec<usize> =
+            (0..9).map(|i| middle + i % 3 - 1 + (i / 3) * (N as usize + 1) - (N as usize + 1)).collect();
         let centre = near.iter().map(|p| found[*p].x).sum::<f32>() / 9.0;
         // A point over the middle of a square: 4 times C-11's element to rectangle, 0.2394 in all.
         assert!((centre - 0.2394).abs() < 0.02, "{centre}");

@@ -181,7 +181,11 @@ fn patches(scene: &Scene, head: &Head, triangles: &[u32], size: u32) -> Outcome<
     for (i, patch) in scene.patches.iter().enumerate() {
         let is_wanted = |part: usize| {
             let part = &head.mesh.parts[part];
-            if patch.parts.is_empty() { part.material == Material::Skin } else { patch.parts.contains(&part.name) }
+            if patch.parts.is_empty() {
+                part.material == Material::Skin
+            } else {
+                patch.parts.contains(&part.name)
+            }
         };
         for (k, number) in numbers.iter_mut().enumerate() {
             let at = [k as u32 % size, k as u32 / size].map(|v| (v as f32 + 0.5) / size as f32);
@@ -210,7 +214,9 @@ fn mesh(head: &Head, shot: &Shot) -> Vec<u8> {
         let sample = |map: &Option<Map>, c: u32| map.as_ref().map_or(0.03, |m| m.sample(uv.x, uv.y, c));
         match &head.maps.albedo {
             Some(map) => Vec3::from([0, 1, 2].map(|c| map.sample(uv.x, uv.y, c))),
-            None => Vec3::from(lookup.sample(sample(&head.maps.melanin, 0), sample(&head.maps.hemoglobin, 0))),
+            None => {
+                Vec3::from(lookup.sample(sample(&head.maps.melanin, 0), sample(&head.maps.hemoglobin, 0)))
+            }
         }
     };
     let mut vertices = Vec::new();
@@ -235,7 +241,8 @@ fn mesh(head: &Head, shot: &Shot) -> Vec<u8> {
             triangles.push(kind);
         }
     }
-    let mut bytes = [(vertices.len() / 9) as u32, (triangles.len() / 4) as u32].map(u32::to_le_bytes).concat();
+    let mut bytes =
+        [(vertices.len() / 9) as u32, (triangles.len() / 4) as u32].map(u32::to_le_bytes).concat();
     bytes.extend(floats(&vertices));
     triangles.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
     bytes

@@ -95,7 +95,8 @@ impl Instance {
 
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
-        let buffers = [&self.positions, &self.previous_positions, &self.tangent_frames, &self.bounced, &self.hairs];
+        let buffers =
+            [&self.positions, &self.previous_positions, &self.tangent_frames, &self.bounced, &self.hairs];
         buffers.iter().map(|b| b.size()).sum::<u64>() + self.blood.bytes() + self.wrinkle_weights.bytes()
     }
 }

@@ -30,8 +30,9 @@ use crate::channels::Channel;
 pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
-    AntialiasMethod, BounceMethod, ColorMethod, CurvatureMethod, DetailMethod, GROUPS, Group, Method, RasterMethod,
-    ScatterMethod, SpecularMethod, Stage, ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
+    AntialiasMethod, BounceMethod, ColorMethod, CurvatureMethod, DetailMethod, GROUPS, Group, Method,
+    RasterMethod, ScatterMethod, SpecularMethod, Stage, ToneMap, TransmitMethod, UnknownMethod,
+    WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
 

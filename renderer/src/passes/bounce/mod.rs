@@ -93,7 +93,8 @@ impl Ways {
             patch_points.extend(of_patch.iter().step_by(of_patch.len().div_ceil(MOST_EMITTERS)).copied());
             patch_starts.push(patch_points.len() as u32);
         }
-        let emitters: Vec<[u32; 2]> = patch_points.iter().map(|p| [*p, corner_of_point[*p as usize]]).collect();
+        let emitters: Vec<[u32; 2]> =
+            patch_points.iter().map(|p| [*p, corner_of_point[*p as usize]]).collect();
         let points = 16 * surface.points.len() as u64;
         Self {
             emitter_count: emitters.len() as u32,

@@ -86,9 +86,9 @@ mod tests;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::{Vec3, Vec4};
+use rubor_rig::error::SkinError;
 use rubor_rig::head::{BASE_COLOR_F0, EYE_RADIUS_MM, LIMBUS_UV, Material, SKIN_F0};
 use rubor_rig::skin::chromophores::{CHANGE_FLOOR, MOST_CHANGE};
-use rubor_rig::error::SkinError;
 use rubor_rig::skin::profile::{Profile, RadialProfile};
 use rubor_rig::skin::slab::SlabTable;
 
@@ -266,7 +266,11 @@ fn rings(radii_mm: &[f64; 3]) -> ([f32; RINGS], [f32; RINGS]) {
         let (mut low, mut high) = (0.0, table.thickness_max * widest_mm);
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
-            if table.sample(TYPICAL_ALBEDO, middle / widest_mm) > share { low = middle } else { high = middle }
+            if table.sample(TYPICAL_ALBEDO, middle / widest_mm) > share {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         low
     };

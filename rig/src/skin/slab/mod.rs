@@ -210,7 +210,11 @@ impl SlabTable {
             let t = ((albedo - a[0]) / (b[0] - a[0])).max(0.0);
             let between = |k: usize| a[k] + t * (b[k] - a[k]);
             // Below the first: the albedo of a collision falls to 0, the radius stays.
-            if albedo < of[0][0] { (of[0][1] * albedo / of[0][0], of[0][2]) } else { (between(1), between(2)) }
+            if albedo < of[0][0] {
+                (of[0][1] * albedo / of[0][0], of[0][2])
+            } else {
+                (between(1), between(2))
+            }
         };
         let entry = |row: usize, column: usize| -> Result<f64, SkinError> {
             let (albedo, radius) = medium(albedo_max * row as f64 / (rows - 1) as f64);

@@ -95,7 +95,8 @@ fn the_kept_table_is_that_of_a_walk() {
 fn mean_radii_are_those_of_gaussians() {
     // Mean of r over 2 pi r G(r): sqrt(pi v / 2).
     let profile = Profile::deon_six();
-    let terms = [(0.0064, 0.233), (0.0484, 0.1), (0.187, 0.118), (0.567, 0.113), (1.99, 0.358), (7.41, 0.078)];
+    let terms =
+        [(0.0064, 0.233), (0.0484, 0.1), (0.187, 0.118), (0.567, 0.113), (1.99, 0.358), (7.41, 0.078)];
     let expected: f64 = terms.iter().map(|(v, w)| w * (std::f64::consts::FRAC_PI_2 * v).sqrt()).sum();
     assert!((profile.channels[0].mean_radius_mm() - expected).abs() < 1e-3 * expected);
 }
