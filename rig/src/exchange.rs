@@ -204,12 +204,14 @@ mod tests {
         let shining: Vec<Vec3> =
             (0..points.len()).map(|p| if p < half { Vec3::ONE } else { Vec3::ZERO }).collect();
         let patches = exchange.averaged(&shining);
-        assert!(patches.iter().all(|v| *v == Vec3::ONE || *v == Vec3::ZERO), "a patch has one normal");
+        // Cuts by halves leave a patch or two with points of both.
+        let mixed = patches.iter().filter(|v| v.x > 0.0 && v.x < 1.0).count();
+        assert!(20 * mixed < patches.len(), "{mixed} of {}", patches.len());
         let found = exchange.gathered(&patches);
         let mean = |range: std::ops::Range<usize>| {
             found[range.clone()].iter().map(|v| v.x).sum::<f32>() / range.len() as f32
         };
-        assert_eq!(mean(0..half), 0.0);
+        assert!(mean(0..half) < 0.01, "{}", mean(0..half));
         // Equal squares at the distance of their side: 0.1998 (Howell, catalogue of configuration factors, C-11). Points of
         // the border count as much as inner ones here, so the mean over points is a little lower.
         assert!((mean(half..2 * half) - 0.1998).abs() < 0.006, "{}", mean(half..2 * half));
