@@ -88,11 +88,12 @@ fn a_lit_square_lights_the_one_before_it() {
     let mean = |c: usize| found.iter().map(|p| f64::from(p[c])).sum::<f64>() / found.len() as f64;
     for (c, albedo) in [0.6f64, 0.4, 0.2].into_iter().enumerate() {
         let expected = albedo * 2.0 / PI * entering(0.6, 0.32, 1.0) * factor;
-        assert!((mean(c) / expected - 1.0).abs() < 0.05, "channel {c}: {} not {expected}", mean(c));
+        // What is seen are some 12 points with 32 rays each: independent ones would have a deviation of 4.6 %.
+        assert!((mean(c) / expected - 1.0).abs() < 0.1, "channel {c}: {} not {expected}", mean(c));
     }
     // Even over the small part that is seen.
     let spread = found.iter().map(|p| (f64::from(p[0]) / mean(0) - 1.0).abs()).fold(0.0, f64::max);
-    assert!(spread < 0.05, "{spread}");
+    assert!(spread < 0.1, "{spread}");
 }
 
 #[test]
