@@ -12,7 +12,7 @@ use crate::channels::{CHANNELS, Channel, ChannelData};
 use crate::device::native;
 use crate::passes::geometry::{morph, shadow, surface_data, tangent_frames, velocity, visibility};
 use crate::passes::hair::overlay;
-use crate::passes::{appearance, compose, resolve, see_through, shade};
+use crate::passes::{appearance, bounce, compose, resolve, see_through, shade};
 use crate::scene::authored::{GpuAuthoredVertex, GpuMaterial, GpuTexture};
 use crate::scene::head::GpuVertex;
 use crate::scene::lamp::GpuLight;
@@ -44,6 +44,13 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     for entry in ["shade_authored", "shade_layer"] {
         assert_workgroups(&shade::authored_program(), &square(entry));
     }
+    assert_workgroups(&bounce::emit_program(), &line("emit"));
+    for again in [false, true] {
+        for entry in ["average", "gather"] {
+            assert_workgroups(&bounce::bounce_program(again), &line(entry));
+        }
+    }
+    assert_workgroups(&bounce::smooth_program(), &line("smooth_light"));
     assert_workgroups(&see_through::behind_program(), &square("behind"));
     assert_raster(&see_through::layer_program(), &["layer_vertex", "layer_fragment"]);
     for hair in [false, true] {
@@ -142,7 +149,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
             has_maps as "has_maps", wrinkle_map_count as "wrinkle_map_count", hair_color as "hair_color",
             is_second_sample as "is_second_sample", transmit_per_mm as "transmit_per_mm",
             skin_flags as "skin_flags", pupil_mm as "pupil_mm", lobes as "lobes", mm_per_texture as "mm_per_texture", ring_taps_mm as "ring_taps_mm",
-            ring_ends_mm as "ring_ends_mm", middle as "middle", harmonics as "harmonics", lights as "lights"),
+            ring_ends_mm as "ring_ends_mm", slab as "slab", middle as "middle", harmonics as "harmonics", lights as "lights"),
     );
     assert_layout(
         &overlay::program(),

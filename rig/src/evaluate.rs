@@ -77,6 +77,8 @@ pub struct LightState {
     pub direction: Vec3,
     /// Half angles of a spot's cone, radians: fully lit up to the first, dark from the second.
     pub cone_half_angles: [f32; 2],
+    /// Radius of the lamp: metres, or of a directional light the tangent of half the angle that it subtends.
+    pub radius: f32,
     /// Whether it casts shadows.
     pub shadow: bool,
 }
@@ -354,6 +356,10 @@ impl Evaluator {
                     position,
                     direction,
                     cone_half_angles: light.cone_degrees.map(|degrees| 0.5 * degrees.to_radians()),
+                    radius: match light.kind {
+                        LightKind::Directional => (0.5 * light.angle_degrees.to_radians()).tan(),
+                        LightKind::Spot | LightKind::Point => 0.5 * light.diameter,
+                    },
                     shadow: light.shadow,
                 }
             })

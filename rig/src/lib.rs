@@ -29,6 +29,7 @@ pub mod color;
 pub mod deform;
 pub mod error;
 pub mod evaluate;
+pub mod exchange;
 pub mod expression;
 pub mod face_state;
 pub mod framing;

@@ -151,6 +151,14 @@ pub struct Light {
     /// `spot`: full angles of the cone, degrees: the inner one is fully lit, outside the outer one it is dark.
     #[serde(default = "cone", skip_serializing_if = "is_default_cone")]
     pub cone_degrees: [f32; 2],
+    /// `point`, `spot`: diameter of the lamp, 0 to 2 metres: the softness of its shadows and the width of its highlights.
+    #[serde(default = "diameter", skip_serializing_if = "is_default_diameter")]
+    #[schemars(range(min = 0, max = 2))]
+    pub diameter: f32,
+    /// `directional`: full angle that the lamp subtends, 0 to 60 degrees; the sun has 0.53.
+    #[serde(default = "angle", skip_serializing_if = "is_default_angle")]
+    #[schemars(range(min = 0, max = 60))]
+    pub angle_degrees: f32,
     /// Whether it casts shadows.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub shadow: bool,
@@ -474,6 +482,27 @@ fn is_default_cone(degrees: &[f32; 2]) -> bool {
     *degrees == cone()
 }
 
+/// Diameter of a lamp with a place of which nothing is said, metres: a small soft box.
+const DIAMETER: f32 = 0.24;
+/// Angle of a distant lamp of which nothing is said, degrees: half of it has a tangent of 0.05.
+const ANGLE_DEGREES: f32 = 5.724_81;
+
+fn diameter() -> f32 {
+    DIAMETER
+}
+
+fn is_default_diameter(metres: &f32) -> bool {
+    *metres == DIAMETER
+}
+
+fn angle() -> f32 {
+    ANGLE_DEGREES
+}
+
+fn is_default_angle(degrees: &f32) -> bool {
+    *degrees == ANGLE_DEGREES
+}
+
 fn yes() -> bool {
     true
 }
@@ -643,6 +672,14 @@ impl Sequence {
         if !(inner >= 0.0 && inner <= outer && outer > 0.0 && outer < 180.0) {
             let expected = "inner and outer angle, 0 <= inner <= outer < 180 degrees";
             return self.wrong(&steps!["lights", i, "coneDegrees"], &format!("[{inner}, {outer}]"), expected);
+        }
+        if !(0.0..=2.0).contains(&light.diameter) {
+            let found = light.diameter.to_string();
+            return self.wrong(&steps!["lights", i, "diameter"], &found, "0 to 2 metres");
+        }
+        if !(0.0..=60.0).contains(&light.angle_degrees) {
+            let found = light.angle_degrees.to_string();
+            return self.wrong(&steps!["lights", i, "angleDegrees"], &found, "0 to 60 degrees");
         }
         let missing = match light.kind {
             LightKind::Directional if light.direction.is_none() => "direction",

@@ -34,10 +34,6 @@ use crate::report::Adapter;
 const BACKDROP_LINEAR: Vec3 = Vec3::new(0.016, 0.018, 0.021);
 /// Side of the skin colour table (see `rubor_rig::skin::chromophores` for its error).
 const COLOR_TABLE_SIDE: u32 = 64;
-/// Radius of a lamp with a place, metres: a soft box of 24 cm.
-pub(crate) const LAMP_RADIUS_METRES: f32 = 0.12;
-/// Tangent of the angular radius of a directional light.
-pub(crate) const DISTANT_LAMP_RADIUS: f32 = 0.05;
 
 /// Opens an adapter by its number or a part of its name, or the best one.
 ///
@@ -382,19 +378,18 @@ fn optics(shot: &Shot) -> Optics {
 
 fn light(state: &LightState) -> Light {
     use rubor_rig::timeline::LightKind as Kind;
-    let (kind, radius) = match state.kind {
-        Kind::Directional => (LightKind::Directional { direction: state.direction }, DISTANT_LAMP_RADIUS),
+    let kind = match state.kind {
+        Kind::Directional => LightKind::Directional { direction: state.direction },
         Kind::Spot => {
             let [inner, outer] = state.cone_half_angles.map(f32::to_degrees);
-            let spot = LightKind::Spot {
+            LightKind::Spot {
                 position: state.position,
                 direction: state.direction,
                 inner_degrees: inner,
                 outer_degrees: outer,
-            };
-            (spot, LAMP_RADIUS_METRES)
+            }
         }
-        Kind::Point => (LightKind::Point { position: state.position }, LAMP_RADIUS_METRES),
+        Kind::Point => LightKind::Point { position: state.position },
     };
-    Light { kind, color_linear: state.power_linear, radius, casts_shadow: state.shadow }
+    Light { kind, color_linear: state.power_linear, radius: state.radius, casts_shadow: state.shadow }
 }

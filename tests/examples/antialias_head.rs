@@ -132,6 +132,7 @@ impl Stage {
             position: Vec3::ZERO,
             direction: Vec3::new(-0.6, -0.5, -0.8).normalize(),
             cone_half_angles: [0.0; 2],
+            radius: 0.05,
             shadow: true,
         };
         let environment = EnvironmentState { name: "studio".into(), intensity: 0.6, rotation_y: 0.0 };

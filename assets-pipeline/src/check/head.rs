@@ -28,6 +28,10 @@ pub fn check(head: &Head) -> Vec<Finding> {
     triangles(head, &mut findings);
     shapes(head, &mut findings);
     names(head, &mut findings);
+    if head.mesh.occlusion.is_empty() && head.mesh.parts.iter().any(|p| p.material == Material::Skin) {
+        let message = "there is no ambient visibility: nostrils, lips and the mouth glow in the light of a sky, and no light goes from one place to another";
+        findings.push(Finding::warning("occlusion", message).fix("`rubor import` traces it"));
+    }
     if head.landmarks.is_empty() {
         let message = "there are no landmarks: synthesised maps have no hair, brows and wrinkles, the camera guesses the face from its size";
         findings.push(Finding::note("landmarks", message));

@@ -15,6 +15,8 @@ use rubor_rig::bvh::Bvh;
 use rubor_rig::deform::{deform_points, point_normals};
 use rubor_rig::head::{Head, Material, Mesh, OcclusionChange};
 
+/// Rays of a point where an import has no other number.
+pub const RAYS: u32 = 128;
 /// Rays start this far off the surface, as part of the head's height: 0.1 mm on an adult head.
 const START: f32 = 3e-4;
 /// Points farther than this from all that a shape moves keep their visibility, as part of the head's height: 13 mm.

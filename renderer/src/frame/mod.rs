@@ -18,6 +18,7 @@ use crate::error::RenderError;
 use crate::passes::antialias::{self, Antialias, History};
 use crate::passes::appearance::Appearance;
 use crate::passes::backdrop::{self, Backdrop};
+use crate::passes::bounce::Bounce;
 use crate::passes::compose::Compose;
 use crate::passes::diffusion::Needs;
 use crate::passes::display::{Display, Flavour};
@@ -38,7 +39,7 @@ use crate::passes::resolve::Resolve;
 use crate::passes::see_through::SeeThrough;
 use crate::passes::shade::{Shade, Transmittance};
 use crate::scene::{Light, MAX_LIGHTS, PosedHead, Scene};
-use crate::settings::{DepthOfFieldMethod, Look, Settings, ToneMap, TransmitMethod};
+use crate::settings::{BounceMethod, DepthOfFieldMethod, Look, Settings, ToneMap, TransmitMethod};
 
 /// The passes of frames, with their pipelines.
 pub(crate) struct Passes {
@@ -69,6 +70,8 @@ pub(crate) struct Passes {
     pub(crate) antialias: Option<Antialias>,
     pub(crate) transmittance: Option<(Arc<Profile>, Transmittance)>,
     pub(crate) surface_data: Option<SurfaceData>,
+    /// Present if the settings ask for it.
+    pub(crate) bounce: Option<Bounce>,
 }
 
 /// A frame while it is recorded.
@@ -129,6 +132,7 @@ impl Passes {
             antialias: None,
             transmittance: None,
             surface_data: None,
+            bounce: None,
         }
     }
 
@@ -168,6 +172,11 @@ impl Passes {
             self.transmittance = None;
         } else if self.transmittance.as_ref().is_none_or(|(p, _)| p != profile) {
             self.transmittance = Some((profile.clone(), Transmittance::new(gpu, profile)?));
+        }
+        if settings.quality.bounce == BounceMethod::None {
+            self.bounce = None;
+        } else if self.bounce.is_none() {
+            self.bounce = Some(Bounce::new(gpu, self.rasteriser.stores_depth()));
         }
         if !surface_data::is_wanted(settings) {
             self.surface_data = None;

@@ -16,7 +16,8 @@ pub(crate) fn record(
     diffusion: &mut dyn Diffusion,
 ) -> Result<Option<Image>, RenderError> {
     frame.pose(r);
-    let light = frame.light(r);
+    let mut light = frame.light(r);
+    frame.bounce(r, &mut light);
     if frame.needs.before_view {
         let before = frame.before(r, &light);
         diffusion.before_view(r, &before);

@@ -27,7 +27,8 @@ pub(crate) async fn draw(
     batches: u32,
 ) -> Result<(Option<Image>, Option<f64>), RenderError> {
     frame.pose(r);
-    let light = frame.light(r);
+    let mut light = frame.light(r);
+    frame.bounce(r, &mut light);
     let copies: Vec<_> = frame.heads.iter().map(|head| Copies::record(r, head)).collect();
     r.submit();
     let size = frame.settings.frame_size();
@@ -104,6 +105,7 @@ fn one_by_one<'a>(all: &Illumination<'a>) -> Vec<(Illumination<'a>, Option<GpuLi
         environment: all.environment,
         environment_intensity: intensity,
         environment_rotation: all.environment_rotation,
+        bounces: false,
     };
     let shining = all.lights.iter().enumerate().filter(|(_, l)| l.color[..3].iter().any(|c| *c > 0.0));
     let mut parts: Vec<_> = shining
@@ -117,6 +119,8 @@ fn one_by_one<'a>(all: &Illumination<'a>) -> Vec<(Illumination<'a>, Option<GpuLi
     if parts.is_empty() || (all.environment.is_some() && all.environment_intensity > 0.0) {
         parts.push((dark(all.environment_intensity), None));
     }
+    // It counts once.
+    parts[0].0.bounces = all.bounces;
     parts
 }
 

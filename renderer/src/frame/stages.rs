@@ -43,7 +43,17 @@ impl<'a> Frame<'a> {
             environment: self.scene.environment,
             environment_intensity: self.scene.environment_intensity,
             environment_rotation: self.scene.environment_rotation,
+            bounces: false,
         }
+    }
+
+    /// Light that heads send to themselves.
+    pub(crate) fn bounce(&self, r: &mut Recorder<'_>, light: &mut Illumination<'a>) {
+        let Some(bounce) = &self.passes.bounce else { return };
+        let before = self.before(r, light);
+        let seen = before.without_picture(r);
+        bounce.record(r, &self.passes.shade, &before.lighting(&seen, None), &self.heads);
+        light.bounces = true;
     }
 
     /// Sample positions within a pixel in this frame.

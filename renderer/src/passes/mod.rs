@@ -3,6 +3,7 @@
 pub mod antialias;
 pub(crate) mod appearance;
 pub(crate) mod backdrop;
+pub(crate) mod bounce;
 pub(crate) mod compose;
 pub(crate) mod diffusion;
 pub(crate) mod display;

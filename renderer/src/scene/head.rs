@@ -22,6 +22,7 @@ use crate::device::kernel::Resource;
 use crate::device::texture::{self, Texel};
 use crate::device::{Bind, Gpu};
 use crate::error::RenderError;
+use crate::passes::bounce::Ways;
 
 /// Largest melanin fraction of the skin colour table (Jimenez 2012 table 7.1).
 pub const MAX_MELANIN: f32 = 0.5;
@@ -94,6 +95,8 @@ pub struct HeadOnGpu {
     pub(crate) clusters: Vec<Cluster>,
     /// Its opaque surface at rest, for methods that lay it out.
     pub(crate) surface: Arc<Surface>,
+    /// What its points see of each other; made when a frame first asks for it.
+    ways: OnceLock<Ways>,
     /// Shared by its levels alone.
     pub(crate) family: Arc<()>,
     ladder: Option<Ladder>,
@@ -105,6 +108,8 @@ pub struct HeadOnGpu {
 pub(crate) struct Surface {
     /// Metres.
     pub(crate) points: Vec<Vec3>,
+    /// Ambient visibility of each point; empty where it is not known.
+    pub(crate) visibility: Vec<f32>,
     pub(crate) vertices: Vec<Vertex>,
     /// Three vertices and the number of the material, in the order of the device's list.
     pub(crate) triangles: Vec<[u32; 4]>,
@@ -263,7 +268,8 @@ impl HeadOnGpu {
     /// Bytes on the device of it and of the levels that were made.
     pub(crate) fn total_bytes(&self) -> u64 {
         let made = self.ladder.as_ref().and_then(|l| l.levels.get()?.first());
-        made.map_or(self.memory_bytes, |(_, level)| level.memory_bytes)
+        let ways = self.ways.get().map_or(0, Ways::bytes);
+        ways + made.map_or(self.memory_bytes, |(_, level)| level.memory_bytes)
     }
 
     fn of(gpu: &Gpu, head: &Head, bounds: (Vec3, Vec3), looks: Looks, hair_roots: &[Root]) -> Self {
@@ -314,9 +320,11 @@ impl HeadOnGpu {
             clusters: clusters(head),
             surface: Arc::new(Surface {
                 points: mesh.points.clone(),
+                visibility: mesh.occlusion.clone(),
                 vertices: mesh.vertices.clone(),
                 triangles: triangles[..opaque as usize].to_vec(),
             }),
+            ways: OnceLock::new(),
             family: Arc::default(),
             ladder: None,
             memory_bytes: 0,
@@ -336,6 +344,11 @@ impl HeadOnGpu {
     /// Single hairs of the scalp: those on the device, and those that grow.
     pub fn hair_counts(&self) -> [u32; 2] {
         [self.hair_root_count, self.grown_hairs]
+    }
+
+    /// What its points see of each other.
+    pub(crate) fn ways(&self, gpu: &Gpu) -> &Ways {
+        self.ways.get_or_init(|| Ways::new(gpu, &self.surface))
     }
 
     /// The undeformed points: a buffer of this head alone.

@@ -63,6 +63,8 @@ pub(crate) struct Illumination<'a> {
     pub(crate) environment_intensity: f32,
     /// Radians about +Y.
     pub(crate) environment_rotation: f32,
+    /// Whether the heads have the light that they send to themselves.
+    pub(crate) bounces: bool,
 }
 
 impl Illumination<'_> {

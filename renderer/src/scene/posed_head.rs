@@ -32,6 +32,8 @@ pub(crate) struct PosedHead<'a> {
     pub(crate) kept_positions: &'a wgpu::Buffer,
     /// Normal and tangent of each vertex, world space.
     pub(crate) tangent_frames: &'a wgpu::Buffer,
+    /// Light from other places of the head at each point, radiance of a white surface.
+    pub(crate) bounced: &'a wgpu::Buffer,
     /// Change of bias, change of scale and neutral mean of hemoglobin.
     pub(crate) blood: &'a Image,
     /// Weight of each wrinkle map, four per layer: an array, whatever its number of layers.
@@ -45,6 +47,7 @@ pub(crate) struct Instance {
     pub(crate) positions: wgpu::Buffer,
     pub(crate) previous_positions: wgpu::Buffer,
     pub(crate) tangent_frames: wgpu::Buffer,
+    bounced: wgpu::Buffer,
     blood: Image,
     wrinkle_weights: Image,
     hairs: wgpu::Buffer,
@@ -68,6 +71,7 @@ impl Instance {
             positions: gpu.storage_zeroed("positions", points),
             previous_positions: gpu.storage_zeroed("previous positions", points),
             tangent_frames: gpu.storage_zeroed("tangent frames", u64::from(head.vertex_count) * FRAME_BYTES),
+            bounced: gpu.storage_zeroed("bounced light", points),
             blood: Image::new(gpu, "blood", ImageSpec::light(side)),
             wrinkle_weights,
             hairs: gpu.storage_zeroed("hairs", hair_bytes(head)),
@@ -91,7 +95,8 @@ impl Instance {
 
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
-        let buffers = [&self.positions, &self.previous_positions, &self.tangent_frames, &self.hairs];
+        let buffers =
+            [&self.positions, &self.previous_positions, &self.tangent_frames, &self.bounced, &self.hairs];
         buffers.iter().map(|b| b.size()).sum::<u64>() + self.blood.bytes() + self.wrinkle_weights.bytes()
     }
 }
@@ -103,7 +108,7 @@ pub(crate) fn instance_bytes(head: &HeadOnGpu) -> u64 {
         ImageSpec::storage([APPEARANCE_SIZE; 2], wgpu::TextureFormat::Rgba8Unorm).layers(layers(head));
     let points = (u64::from(head.point_count) * 16).max(16);
     let frames = (u64::from(head.vertex_count) * FRAME_BYTES).max(16);
-    2 * points + frames + hair_bytes(head).max(16) + blood.bytes() + weights.bytes()
+    3 * points + frames + hair_bytes(head).max(16) + blood.bytes() + weights.bytes()
 }
 
 fn hair_bytes(head: &HeadOnGpu) -> u64 {
@@ -133,6 +138,7 @@ pub(crate) fn posed<'a>(
         },
         kept_positions: &buffers.previous_positions,
         tangent_frames: &buffers.tangent_frames,
+        bounced: &buffers.bounced,
         blood: &buffers.blood,
         wrinkle_weights: &buffers.wrinkle_weights,
         hairs: &buffers.hairs,

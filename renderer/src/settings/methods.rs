@@ -356,6 +356,13 @@ groups! {
         /// Thickness and the place nearest to the lamp, blurred light from there; only with texture-space.
         TranslucentShadowMap, "translucent-shadow-map", BeforeView, "d'Eon and Luebke 2007; Lee, Realistic Skin Rendering";
     }
+    /// Light from one place of a head on another.
+    BounceMethod, "bounce", "Light from one place of a head on another" {
+        /// None, but for a guess of the sky's light between the walls of a cavity.
+        None, "none", Nowhere, "Jimenez et al. 2016, multiple-bounce ambient occlusion";
+        /// Light of lamps and sky on patches of the skin, sent on along rays of every point of the head at rest.
+        Patches, "patches", BeforeView, "Goral et al. 1984";
+    }
     /// Where methods that need the curvature of the skin take it from.
     CurvatureMethod, "curvature", "Curvature of the skin" {
         /// Both principal curvatures of the deformed mesh, smoothed over neighbouring points.
@@ -499,6 +506,7 @@ mod tests {
         check::<TransmitMethod>(&TransmitMethod::GROUP);
         check::<ColorMethod>(&ColorMethod::GROUP);
         check::<WrinkleMethod>(&WrinkleMethod::GROUP);
+        check::<BounceMethod>(&BounceMethod::GROUP);
         check::<SpecularMethod>(&SpecularMethod::GROUP);
         check::<RasterMethod>(&RasterMethod::GROUP);
         check::<DetailMethod>(&DetailMethod::GROUP);

@@ -30,9 +30,9 @@ use crate::channels::Channel;
 pub use antialias::{AntialiasPatterns, AntialiasPreset};
 pub use leaves::{Leaf, leaves};
 pub use methods::{
-    AntialiasMethod, BackdropMethod, ColorMethod, CurvatureMethod, DepthOfFieldMethod, DetailMethod,
-    DitherMethod, GROUPS, Group, Method, RasterMethod, ScatterMethod, SpecularMethod, Stage, ToneMap,
-    TransmitMethod, UnknownMethod, WrinkleMethod,
+    AntialiasMethod, BackdropMethod, BounceMethod, ColorMethod, CurvatureMethod, DepthOfFieldMethod,
+    DetailMethod, DitherMethod, GROUPS, Group, Method, RasterMethod, ScatterMethod, SpecularMethod, Stage,
+    ToneMap, TransmitMethod, UnknownMethod, WrinkleMethod,
 };
 pub use profile::DiffusionProfile;
 
@@ -73,6 +73,8 @@ pub struct Quality {
     pub scatter: ScatterMethod,
     /// How light passes through thin parts
     pub transmit: TransmitMethod,
+    /// Light from one place of a head on another
+    pub bounce: BounceMethod,
     /// Where pre-integrated scattering takes the curvature of the skin from
     pub curvature: CurvatureMethod,
     /// Whether the blood of a face moves
@@ -216,6 +218,7 @@ impl Default for Quality {
         Self {
             scatter: ScatterMethod::Separable(17),
             transmit: TransmitMethod::ShadowDepth,
+            bounce: BounceMethod::Patches,
             curvature: CurvatureMethod::Mesh,
             color: ColorMethod::Hemoglobin,
             wrinkles: WrinkleMethod::PartialDerivative,

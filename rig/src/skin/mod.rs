@@ -37,6 +37,7 @@ pub(crate) mod numerics;
 pub mod preintegrated;
 pub mod profile;
 pub mod report;
+pub mod slab;
 pub mod table;
 pub mod transmittance;
 pub mod volume;

@@ -108,10 +108,27 @@ impl RadialProfile {
         }
     }
 
-    /// Light through a slab of thickness `s_mm` under uniform irradiance: the integral of `R(sqrt(r^2 + s^2))` over
+    /// Mean distance between where light enters and where it leaves, mm.
+    pub fn mean_radius_mm(&self) -> f64 {
+        // The integral of the light beyond r over r. Panels double from a width at which next to nothing has happened.
+        let beyond = |r: f64| self.mass_beyond(r) / self.total();
+        let mut edge = 1e-3 * self.sample_radius(0.5);
+        let mut sum = integrate(&PANEL_RULE, 0.0, edge, beyond);
+        for _ in 0..60 {
+            let panel = integrate(&PANEL_RULE, edge, 1.5 * edge, beyond);
+            sum += panel;
+            edge *= 1.5;
+            if panel < 1e-6 * sum {
+                break;
+            }
+        }
+        sum
+    }
+
+    /// Light through a slab of thickness `s_mm` under uniform irradiance, as the profile of a half space has it: the integral of `R(sqrt(r^2 + s^2))` over
     /// the plane (Jimenez 2012, eq. 5.9).
     ///
-    /// With `rho^2 = r^2 + s^2` it is the integral of R outside of a disk of radius s, for any profile.
+    /// With `rho^2 = r^2 + s^2` it is the integral of R outside of a disk of radius s, for any profile. What a slab really passes is in [`super::slab`].
     pub fn transmittance(&self, s_mm: f64) -> f64 {
         self.mass_beyond(s_mm)
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Subcommand;
-use rubor_assets::convert::{chromophores, own_color};
+use rubor_assets::convert::{chromophores, occlusion, own_color};
 use rubor_assets::export::gltf::MapEncodings;
 use rubor_assets::{export, import, landmarks, parts, synthesize};
 use rubor_rig::expression::Rig;
@@ -385,6 +385,11 @@ pub(crate) fn finish_with(
         console::notes(&[Note::new(&about, "no skin has a colour by itself: --gain has no effect")]);
     }
     let has_skin = head.mesh.parts.iter().any(|p| p.material == Material::Skin);
+    if has_skin && head.mesh.occlusion.is_empty() {
+        occlusion::bake(&mut head, occlusion::RAYS);
+        // Differences of the same rays: half of them have as little noise.
+        occlusion::bake_shapes(&mut head, occlusion::RAYS / 2, &occlusion::SHAPES);
+    }
     if !has_skin && common.maps > 0 {
         let message =
             "no part is skin: no maps, brows and lashes are made (`--parts NAME=skin` makes a part skin)";

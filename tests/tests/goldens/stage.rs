@@ -27,8 +27,6 @@ use crate::cases::{Channel, Methods, Model};
 const BACKDROP_LINEAR: Vec3 = Vec3::new(0.016, 0.018, 0.021);
 /// Distance of heads that stand side by side, metres.
 const SPACING: f32 = 0.26;
-/// Radius of a lamp with a place, metres, and tangent of the angular radius of a directional one.
-const LAMP_RADIUS: [f32; 2] = [0.12, 0.05];
 /// Side of the skin colour table, texels.
 const COLOR_TABLE_SIDE: u32 = 64;
 /// Texels on a side of a shadow map: 0.3 mm in a picture of a face.
@@ -341,16 +339,14 @@ impl Stage {
 }
 
 fn light(state: &LightState) -> Light {
-    let (kind, radius) = match state.kind {
-        timeline::LightKind::Directional => {
-            (LightKind::Directional { direction: state.direction }, LAMP_RADIUS[1])
-        }
+    let kind = match state.kind {
+        timeline::LightKind::Directional => LightKind::Directional { direction: state.direction },
         timeline::LightKind::Spot => {
             let [inner_degrees, outer_degrees] = state.cone_half_angles.map(f32::to_degrees);
             let (position, direction) = (state.position, state.direction);
-            (LightKind::Spot { position, direction, inner_degrees, outer_degrees }, LAMP_RADIUS[0])
+            LightKind::Spot { position, direction, inner_degrees, outer_degrees }
         }
-        timeline::LightKind::Point => (LightKind::Point { position: state.position }, LAMP_RADIUS[0]),
+        timeline::LightKind::Point => LightKind::Point { position: state.position },
     };
-    Light { kind, color_linear: state.power_linear, radius, casts_shadow: state.shadow }
+    Light { kind, color_linear: state.power_linear, radius: state.radius, casts_shadow: state.shadow }
 }

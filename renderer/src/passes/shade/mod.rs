@@ -90,10 +90,11 @@ mod tests;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::{Vec3, Vec4};
+use rubor_rig::error::SkinError;
 use rubor_rig::head::{BASE_COLOR_F0, EYE_RADIUS_MM, LIMBUS_UV, Material, SKIN_F0};
 use rubor_rig::skin::chromophores::{CHANGE_FLOOR, MOST_CHANGE};
-use rubor_rig::skin::profile::Profile;
-use rubor_rig::skin::transmittance::TransmittanceTable;
+use rubor_rig::skin::profile::{Profile, RadialProfile};
+use rubor_rig::skin::slab::SlabTable;
 
 use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
@@ -121,6 +122,9 @@ const PARTS: [Module; 3] = [
 /// tangent plane. A step of 4 mm (lip over teeth, wing of the nose over cheek) separates fully; the curve of a cheek
 /// does not. Transmittance leaves the rest to scattering.
 pub(crate) const FOLLOW_PER_MM: f32 = 0.25;
+
+/// Bit of [`Params::skin_flags`]: points have light from other places of the head.
+pub(crate) const BOUNCES: u32 = 4;
 
 /// The shader of the pass.
 pub(crate) fn program() -> Program {
@@ -171,6 +175,7 @@ fn with_constants(program: Program) -> Program {
     program
         .with(&PARTS)
         .constant("AUTHORED_SHIFT", AUTHORED_SHIFT)
+        .constant("BOUNCES", BOUNCES)
         .constant("FOLLOW_PER_MM", FOLLOW_PER_MM)
         .constant("MAX_HEMOGLOBIN", MAX_HEMOGLOBIN)
         .constant("TRANSMIT_RINGS", RINGS as u32)
@@ -194,8 +199,6 @@ fn with_constants(program: Program) -> Program {
 /// deeper, is not drawn. Chosen by eye on the default head.
 const RELIEF_SCALE: f32 = 1.35;
 
-/// Entries of T(s): a step of 0.03 mm for skin.
-const TRANSMITTANCE_ENTRIES: usize = 256;
 /// Rings of the plane across a light.
 const RINGS: usize = 4;
 
@@ -219,52 +222,66 @@ pub(crate) struct Params {
     pub(crate) mm_per_texture: f32,
     pub(crate) ring_taps_mm: [f32; RINGS],
     pub(crate) ring_ends_mm: [f32; RINGS],
+    pub(crate) slab: [f32; 4],
     pub(crate) middle: [f32; 4],
     pub(crate) harmonics: [[f32; 4]; 9],
     pub(crate) lights: [GpuLight; MAX_LIGHTS],
 }
 
-/// T(s) of a profile as a texture of one row.
+/// Light through slabs of skin, as a texture and with the lengths of a profile.
 pub(crate) struct Transmittance {
-    table: wgpu::TextureView,
+    slabs: wgpu::TextureView,
     thickness_max_mm: f32,
     ring_taps_mm: [f32; RINGS],
     ring_ends_mm: [f32; RINGS],
+    slab: [f32; 4],
 }
 
+/// Albedo of a medium by which rings and the farthest thickness are laid out: that of red in light skin.
+const TYPICAL_ALBEDO: f64 = 0.6;
+
 impl Transmittance {
-    /// Samples T(s) of a profile.
+    /// Takes lengths from a profile.
     ///
     /// # Errors
     /// The profile has no finite width.
     pub(crate) fn new(gpu: &Gpu, profile: &Profile) -> Result<Self, RenderError> {
-        let table = TransmittanceTable::new(profile, TRANSMITTANCE_ENTRIES, None)?;
-        let mut texels: Vec<_> =
-            table.values.iter().map(|t| [t[0] as f32, t[1] as f32, t[2] as f32, 1.0]).collect();
-        // A slab thicker than the table transmits nothing.
-        if let Some(last) = texels.last_mut() {
-            *last = [0.0; 4];
+        let table = SlabTable::kept();
+        let radii_mm = profile.channels.each_ref().map(RadialProfile::mean_radius_mm);
+        if let Some(radius) = radii_mm.iter().find(|r| !(**r > 0.0 && r.is_finite())) {
+            return Err(SkinError::new("profile", radius, "a mean radius above 0 and finite").into());
         }
-        let size = [texels.len() as u32, 1];
-        let (ring_taps_mm, ring_ends_mm) = rings(&table);
+        let row = |row: &Vec<f64>| {
+            let (last, others) = row.split_last().expect("a test reads the kept table");
+            // What is thicker than the table passes nothing.
+            others.iter().chain([&(0.0 * last)]).map(|t| [*t as f32, 0.0, 0.0, 1.0]).collect::<Vec<_>>()
+        };
+        let size = [table.rows[0].len() as u32, table.rows.len() as u32];
+        let texels = table.rows.iter().flat_map(row).collect();
+        let (ring_taps_mm, ring_ends_mm) = rings(&radii_mm);
+        let [r, g, b] = radii_mm.map(|radius| (1.0 / (table.thickness_max * radius)) as f32);
+        let widest_mm = radii_mm.into_iter().fold(0.0, f64::max);
         Ok(Self {
             ring_taps_mm,
             ring_ends_mm,
-            table: texture::upload_half(gpu, "transmittance", size, &[vec![texels]]),
-            thickness_max_mm: table.thickness_max_mm as f32,
+            slabs: texture::upload_half(gpu, "slabs", size, &[vec![texels]]),
+            thickness_max_mm: (table.thickness_max * widest_mm) as f32,
+            slab: [r, g, b, (1.0 / table.albedo_max) as f32],
         })
     }
 }
 
 /// Radii of taps and outer edges of rings with equal shares of the light that reaches a point from a plane behind
 /// it, at a depth that a quarter of the farthest-reaching channel passes; the last ring is unbounded.
-fn rings(table: &TransmittanceTable) -> ([f32; RINGS], [f32; RINGS]) {
-    // T decreases, so bisection finds the radius.
+fn rings(radii_mm: &[f64; 3]) -> ([f32; RINGS], [f32; RINGS]) {
+    let table = SlabTable::kept();
+    let widest_mm = radii_mm.iter().copied().fold(0.0, f64::max);
+    // The table decreases, so bisection finds the thickness that passes a share.
     let thickness_at = |share: f64| {
-        let (mut low, mut high) = (0.0, table.thickness_max_mm);
+        let (mut low, mut high) = (0.0, table.thickness_max * widest_mm);
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
-            if table.sample(middle).into_iter().fold(0.0, f64::max) > share {
+            if table.sample(TYPICAL_ALBEDO, middle / widest_mm) > share {
                 low = middle
             } else {
                 high = middle
@@ -614,12 +631,13 @@ impl Shade {
             ("trilinear_repeat", self.trilinear_repeat.bound()),
             ("linear_clamp", self.linear_clamp.bound()),
             ("compare", self.compare.bound()),
-            ("transmittance", lighting.transmittance.map_or(&self.black, |t| &t.table).bound()),
+            ("slabs", lighting.transmittance.map_or(&self.black, |t| &t.slabs).bound()),
             ("directional_albedo", own_albedo.unwrap_or(&self.directional_albedo.1).bound()),
             ("positions", posed.positions.bound()),
             ("vertices", posed.head.vertices.bound()),
             ("triangles", posed.head.triangles.bound()),
             ("frames", posed.tangent_frames.bound()),
+            ("bounced", posed.bounced.bound()),
             ("skin_map", maps.map_or(&self.black, |m| &m.skin).bound()),
             ("gloss_map", maps.map_or(&self.black, |m| &m.gloss).bound()),
             ("slope_map", maps.map_or(&self.black, |m| &m.slopes).bound()),
@@ -674,7 +692,8 @@ pub(crate) fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
         },
         is_second_sample: u32::from(lighting.first.is_some()),
         skin_flags: u32::from(quality.wrinkles == WrinkleMethod::Difference)
-            | u32::from(maps.is_some_and(|m| m.has_own_color)) << 1,
+            | u32::from(maps.is_some_and(|m| m.has_own_color)) << 1
+            | if lighting.light.bounces { BOUNCES } else { 0 },
         pupil_mm: posed.state.pupil_mm,
         transmit_per_mm: lighting.transmittance.map_or(0.0, |t| 1.0 / t.thickness_max_mm),
         lobes: match maps {
@@ -684,6 +703,7 @@ pub(crate) fn params(lighting: &Lighting<'_>, posed: &PosedHead<'_>) -> Params {
         mm_per_texture: posed.head.mm_per_texture,
         ring_taps_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_taps_mm),
         ring_ends_mm: lighting.transmittance.map_or([0.0; RINGS], |t| t.ring_ends_mm),
+        slab: lighting.transmittance.map_or([0.0; 4], |t| t.slab),
         hair_color: maps.map_or([0.0; 4], |m| {
             let [r, g, b] = m.hair_color_linear;
             [r, g, b, 1.0]

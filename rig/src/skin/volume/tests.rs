@@ -73,6 +73,7 @@ fn sun(direction: Vec3) -> LightState {
         position: Vec3::ZERO,
         direction: direction.normalize(),
         cone_half_angles: [0.0; 2],
+        radius: 0.05,
         shadow: true,
     }
 }

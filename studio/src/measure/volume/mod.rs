@@ -14,7 +14,8 @@
 //!   enters nearer to it and returns sooner, and what leaves is no Lambertian cone.
 //! - The real-time boundary loses `rho(L)` on entry and `rho(V)` on exit, by the lobe of the highlight (Beckmann, Kelemen and
 //!   Szirmay-Kalos 2001); the volume has the transmittance of microfacets (GGX, Walter et al. 2007).
-//! - The volume has light that leaves the skin and enters elsewhere; methods do not.
+//! - Light that leaves the skin and enters elsewhere goes along its path in the volume, through patches of the surface in rubor.
+//! - Light that crosses a thin part without a collision counts in rubor (its scatterers stand for forward ones), not in the volume.
 //! - The lining of mouth and eyes is tissue in the volume; methods scatter in skin alone.
 //! - Soft shadows: the lamp is a disk in the volume, a filter of a shadow map in real time.
 //!
@@ -124,10 +125,11 @@ pub fn run(
     watch: &mut dyn Watch,
 ) -> Outcome<VolumeReport> {
     let flesh = options.medium.flesh()?;
-    let head = skin::bare_head(head);
-    studio.set_heads([&head])?;
-    let color = skin::bare_color(studio.skin());
     let [flat, _] = flat_reflectance(&flesh, 1.0, FLAT_PATHS, SEED);
+    let fractions = skin::fractions_of(flat, studio.skin());
+    let head = skin::bare_head(head, fractions);
+    studio.set_heads([&head])?;
+    let color = skin::bare_color(fractions, studio.skin());
     let size = base.output.size;
     let mut report = VolumeReport {
         adapter: studio.adapter(),

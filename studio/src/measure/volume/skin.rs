@@ -13,7 +13,7 @@ use rubor_renderer::settings::{
 use rubor_rig::evaluate::Shot;
 use rubor_rig::head::{Head, SkinMaps};
 use rubor_rig::map::Map;
-use rubor_rig::skin::chromophores::SkinLookup;
+use rubor_rig::skin::chromophores::{SkinLookup, fractions_at};
 use rubor_rig::skin::medium::{Medium, SKIN1, SKIN2, rgb_media};
 use rubor_rig::skin::model::ProfileModel;
 use rubor_rig::skin::volume::{Flesh, Lamp, Masking};
@@ -21,7 +21,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Failure, Outcome};
-use crate::studio::{DISTANT_LAMP_RADIUS, LAMP_RADIUS_METRES};
 
 /// Index of refraction of skin.
 const ETA: f64 = 1.4;
@@ -34,8 +33,8 @@ const ROUGHNESS: f64 = 0.1;
 const EXPORTED_ROUGHNESS: f64 = 0.3;
 /// Photons of the profile: 0.3 % on its total.
 const PHOTONS: u64 = 400_000;
-/// Melanin and hemoglobin of the head; their colour is divided out.
-const FRACTIONS: [f32; 2] = [0.03, 0.03];
+/// Steps on a side of the colours among which [`fractions_of`] looks.
+const STEPS: u32 = 256;
 
 /// A skin of Jensen, Marschner, Levoy and Hanrahan 2001.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -108,12 +107,27 @@ impl MediumName {
 /// Index and roughness of the boundary.
 pub const BOUNDARY: [f64; 2] = [ETA, ROUGHNESS];
 
-/// The head with maps that say the same everywhere.
-pub fn bare_head(head: &Head) -> Head {
+/// Melanin and hemoglobin whose colour is nearest to one, by its logarithm.
+///
+/// Light that crosses a thin part, or goes from one place to another, depends on the colour of the skin; else it would not matter,
+/// as it is divided out.
+pub fn fractions_of(color: [f64; 3], lookup: &SkinLookup) -> [f32; 2] {
+    let at = |i: u32| (i as f32 + 0.5) / STEPS as f32;
+    let error = |[u, v]: [f32; 2]| {
+        let found = lookup.sample_at(u, v);
+        (0..3).map(|c| (f64::from(found[c]).max(1e-4) / color[c]).ln().powi(2)).sum::<f64>()
+    };
+    let places = (0..STEPS * STEPS).map(|i| [at(i % STEPS), at(i / STEPS)]);
+    let best = places.min_by(|a, b| error(*a).total_cmp(&error(*b))).unwrap_or([0.5; 2]);
+    fractions_at(f64::from(best[0]), f64::from(best[1])).map(|f| f as f32)
+}
+
+/// The head with maps that say the same everywhere: volume fractions of melanin and hemoglobin.
+pub fn bare_head(head: &Head, fractions: [f32; 2]) -> Head {
     let even = |texel: &[f32]| Some(Map::filled(1, 1, texel));
     let maps = SkinMaps {
-        melanin: even(&FRACTIONS[..1]),
-        hemoglobin: even(&FRACTIONS[1..]),
+        melanin: even(&fractions[..1]),
+        hemoglobin: even(&fractions[1..]),
         // Reflectance of the index 1.4.
         specular: even(&[1.0, ROUGHNESS as f32]),
         scattering: even(&[1.0]),
@@ -123,8 +137,8 @@ pub fn bare_head(head: &Head) -> Head {
 }
 
 /// Colour of [`bare_head`] seen from the front, linear.
-pub fn bare_color(lookup: &SkinLookup) -> [f32; 3] {
-    lookup.sample(FRACTIONS[0], FRACTIONS[1])
+pub fn bare_color(fractions: [f32; 2], lookup: &SkinLookup) -> [f32; 3] {
+    lookup.sample(fractions[0], fractions[1])
 }
 
 /// The shot in the light of its lamps alone, all with shadows; the head has no zones and no blood that moves.
@@ -140,5 +154,5 @@ pub fn bare_shot(shot: &Shot) -> Shot {
 
 /// The lamps of a shot, as wide as the renderer makes them.
 pub fn lamps(shot: &Shot) -> Vec<Lamp> {
-    shot.lights.iter().map(|state| Lamp::new(state, LAMP_RADIUS_METRES, DISTANT_LAMP_RADIUS)).collect()
+    shot.lights.iter().map(|state| Lamp::new(state, state.radius, state.radius)).collect()
 }
