@@ -59,6 +59,8 @@ pub mod review;
 pub mod run;
 pub mod stop;
 pub mod studio;
+#[cfg(feature = "view")]
+pub mod view;
 pub mod walks;
 pub mod watch;
 mod writers;

@@ -25,7 +25,7 @@ use crate::studio::{Frame, Studio};
 /// Share of the width of a head that is left free between two heads.
 const SPACING: f32 = 1.05;
 /// Frames before a frame that its pixels depend on, with antialiasing over time.
-const REMEMBERED_FRAMES: u32 = 2;
+pub(crate) const REMEMBERED_FRAMES: u32 = 2;
 
 /// A job that can be drawn.
 pub struct Plan<'a> {
