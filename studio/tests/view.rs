@@ -146,7 +146,7 @@ fn a_session_from_opening_to_closing() {
             json!({ "press": "Z", "ctrl": true, "shift": true }),
             json!({ "until": "done again" }),
             json!({ "click": "track expressions.joy" }),
-            json!({ "drag": "key expressions.joy 2", "by": [60, 0] }),
+            json!({ "drag": "key expressions.joy 2", "by": [200, 0] }),
             json!({ "report": "moved.json" }),
             json!({ "press": "Z", "ctrl": true }),
             json!({ "write": "rig.json", "text": broken }),

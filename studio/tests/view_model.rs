@@ -196,7 +196,7 @@ fn files_are_read_again_and_broken_ones_leave_the_last_good_state() {
     std::fs::write(s.path(Kind::Rig), RIG.replace("\"hemoglobinScale\": 1.2", "\"hemoglobinScale\": oops")).expect("a file");
     s.model.reload(Kind::Rig);
     let error = s.error(About::File(Kind::Rig)).expect("an error");
-    assert!(error.contains("rig.json:7:57"), "{error}");
+    assert!(error.contains("rig.json:7:63"), "{error}");
     assert_eq!(s.model.shot(), before);
     let stronger = RIG.replace("\"mouthSmileLeft\": 1.0", "\"mouthSmileLeft\": 0.4");
     std::fs::write(s.path(Kind::Rig), &stronger).expect("a file");

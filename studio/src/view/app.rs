@@ -649,7 +649,7 @@ impl App {
         if pressed(command(Key::S)) {
             self.save();
         }
-        if ctx.egui_wants_keyboard_input() {
+        if ctx.text_edit_focused() {
             return;
         }
         if pressed(with_shift(Key::Z)) || pressed(command(Key::Y)) {
@@ -659,11 +659,13 @@ impl App {
         }
         let key = |key| ctx.input_mut(|i| i.consume_key(Modifiers::NONE, key));
         let frame = i64::from(self.model.frame());
-        if key(Key::Space) {
+        // A widget that has the focus takes space and arrows for itself.
+        let is_free = ctx.memory(|m| m.focused().is_none());
+        if is_free && key(Key::Space) {
             self.play();
-        } else if key(Key::ArrowLeft) {
+        } else if is_free && key(Key::ArrowLeft) {
             self.seek_frame(frame - 1);
-        } else if key(Key::ArrowRight) {
+        } else if is_free && key(Key::ArrowRight) {
             self.seek_frame(frame + 1);
         } else if key(Key::Home) {
             self.seek_frame(0);

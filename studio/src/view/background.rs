@@ -23,7 +23,7 @@ const REFERENCE_BATCHES: u32 = 64;
 const COMPARED_ON_PROCESSOR: u32 = 256;
 
 /// What is to be done.
-pub enum Task {
+pub(crate) enum Task {
     /// Draw a still; the number is that of the state it shows.
     Draw(Still, u64),
     /// Compare the settings of a still with the reference.
@@ -33,7 +33,7 @@ pub enum Task {
 }
 
 /// What was done.
-pub enum Done {
+pub(crate) enum Done {
     /// A still and the number of its state.
     Drawn(Outcome<Frame>, u64),
     /// How far settings are from the reference.
@@ -43,25 +43,25 @@ pub enum Done {
 }
 
 /// Settings beside the reference.
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// Mean of the visible difference.
-    pub flip_mean: f64,
+    pub(crate) flip_mean: f64,
     /// Its 99th percentile.
-    pub flip_99: f64,
+    pub(crate) flip_99: f64,
     /// Relative root mean square error of the displayed light.
-    pub relative_rmse: f64,
+    pub(crate) relative_rmse: f64,
     /// Size of the compared pictures.
-    pub size: [u32; 2],
+    pub(crate) size: [u32; 2],
     /// The settings that were compared.
-    pub settings: Settings,
+    pub(crate) settings: Settings,
     /// The right picture.
-    pub reference: RgbImage,
+    pub(crate) reference: RgbImage,
     /// Where the difference is seen.
-    pub difference: RgbImage,
+    pub(crate) difference: RgbImage,
 }
 
 /// A thread that does tasks in order.
-pub struct Background {
+pub(crate) struct Background {
     tasks: Sender<Task>,
     done: Receiver<Done>,
     waiting: usize,
@@ -69,7 +69,7 @@ pub struct Background {
 
 impl Background {
     /// Starts the thread; `wake` is called after each task.
-    pub fn new(adapter: Option<String>, wake: impl Fn() + Send + 'static) -> Self {
+    pub(crate) fn new(adapter: Option<String>, wake: impl Fn() + Send + 'static) -> Self {
         let (tasks, receiver) = channel();
         let (sender, done) = channel();
         std::thread::spawn(move || {
@@ -85,19 +85,19 @@ impl Background {
     }
 
     /// Adds a task.
-    pub fn add(&mut self, task: Task) {
+    pub(crate) fn add(&mut self, task: Task) {
         if self.tasks.send(task).is_ok() {
             self.waiting += 1;
         }
     }
 
     /// Whether tasks wait or run.
-    pub fn is_busy(&self) -> bool {
+    pub(crate) fn is_busy(&self) -> bool {
         self.waiting > 0
     }
 
     /// What was done since the last call.
-    pub fn done(&mut self) -> Vec<Done> {
+    pub(crate) fn done(&mut self) -> Vec<Done> {
         let done: Vec<Done> = self.done.try_iter().collect();
         self.waiting -= done.len().min(self.waiting);
         done

@@ -11,7 +11,7 @@
 //! would stop the window is in `background`. [`script::Script`] stands in for a person, in tests and for documentation.
 
 mod app;
-pub mod background;
+mod background;
 pub mod document;
 mod frame;
 pub mod history;
