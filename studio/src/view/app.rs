@@ -510,6 +510,10 @@ impl App {
             Ok(true) => {
                 if self.shown.is_some_and(|(_, divisor, overlay)| divisor == 1 && overlay == Overlay::None) {
                     self.full_ms = Some(self.picture.frame_ms());
+                    if self.picture.drawn() == 1 {
+                        // The first frame compiles shaders; the second tells how long one takes.
+                        self.shown = None;
+                    }
                 }
             }
             Ok(false) => {}
@@ -687,6 +691,8 @@ impl eframe::App for App {
         if let Some(mut script) = self.script.take() {
             let events = script.step(self, ctx);
             input.events.extend(events);
+            // A virtual display has nobody who gives windows the focus.
+            input.focused = true;
             if !script.is_done() {
                 ctx.request_repaint();
                 self.script = Some(script);
