@@ -683,7 +683,9 @@ impl Model {
         if is_known {
             return format!("live: the head has no {what} {name:?}: it has no effect");
         }
-        let hint = nearest(name, self.shapes.names().chain(rubor_rig::names::vocabulary()));
+        let names: Vec<&str> = self.shapes.names().collect();
+        let known: Vec<&str> = rubor_rig::names::vocabulary().collect();
+        let hint = nearest(name, names.into_iter().chain(known));
         let hint = hint.map(|n| format!("; did you mean {n:?}?")).unwrap_or_default();
         format!("live: the unknown {what} {name:?}{hint}")
     }

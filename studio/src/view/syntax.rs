@@ -79,7 +79,16 @@ pub fn set(text: &str, path: &[Step], value: &str) -> Result<String, EditError> 
 /// A text that is no JSON; no array at the path.
 pub fn insert(text: &str, path: &[Step], index: usize, value: &str) -> Result<String, EditError> {
     let (mark, root) = parse(text)?;
-    array_at(&root, path)?.insert(index, CstInputValue::Number(value.to_owned()));
+    let inserted = array_at(&root, path)?.insert(index, CstInputValue::Number(value.to_owned()));
+    // Between elements on one line the library leaves the space that was there beside its own.
+    let after: Vec<CstNode> = inserted.next_siblings().take(3).collect();
+    if let [comma, space, second] = &after[..]
+        && comma.is_comma()
+        && space.is_whitespace()
+        && second.is_whitespace()
+    {
+        second.clone().remove();
+    }
     Ok(format!("{mark}{root}"))
 }
 

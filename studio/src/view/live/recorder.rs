@@ -25,7 +25,8 @@ pub struct Recorder {
     start: Instant,
     /// Seconds of the sequence at which it started.
     offset_s: f64,
-    series: BTreeMap<Vec<Step>, Vec<(f64, f32)>>,
+    /// By field and name.
+    series: BTreeMap<(String, String), Vec<(f64, f32)>>,
 }
 
 impl Recorder {
@@ -44,21 +45,22 @@ impl Recorder {
         // Times are written to a tenth of a millisecond; keys have to differ.
         const LEAST_S: f64 = 1e-3;
         let time_s = self.offset_s + self.length_s(at);
-        let mut note = |path: Vec<Step>, value: f32| {
-            let samples = self.series.entry(path).or_default();
+        let mut note = |field: &str, name: &str, value: f32| {
+            let samples = self.series.entry((field.to_owned(), name.to_owned())).or_default();
+            let count = samples.len();
             match samples.last_mut() {
                 Some((t, v)) if time_s - *t < LEAST_S => *v = value,
-                _ if samples.len() < MOST_SAMPLES => samples.push((time_s, value)),
+                _ if count < MOST_SAMPLES => samples.push((time_s, value)),
                 _ => {}
             }
         };
         for group in [Group::Expressions, Group::States, Group::Shapes] {
             let Some(field) = group.field() else { continue };
-            live.of(group).iter().for_each(|(name, value)| note(path_of(field, name), *value));
+            live.of(group).iter().for_each(|(name, value)| note(field, name, *value));
         }
         if let Some(degrees) = live.head_degrees {
             for (field, value) in ["yawDegrees", "pitchDegrees", "rollDegrees"].iter().zip(degrees) {
-                note(path_of("head", field), value);
+                note("head", field, value);
             }
         }
     }
@@ -67,15 +69,14 @@ impl Recorder {
     pub fn tracks(self) -> (Vec<(Vec<Step>, Vec<Key<f32>>)>, f64) {
         let mut end = 0.0f64;
         let mut tracks = Vec::new();
-        for (path, samples) in self.series {
+        for ((field, name), samples) in self.series {
             if samples.iter().all(|(_, v)| *v == 0.0) {
                 continue;
             }
-            let is_angle = path.first() == Some(&Step::from("head"));
-            let kept = simplified(&samples, if is_angle { DEGREES_ERROR } else { WEIGHT_ERROR });
+            let kept = simplified(&samples, if field == "head" { DEGREES_ERROR } else { WEIGHT_ERROR });
             end = end.max(kept.last().map_or(0.0, |(t, _)| *t));
             let key = |(t, v): &(f64, f32)| Key { t: *t, v: *v, ease: Ease::Linear };
-            tracks.push((path, kept.iter().map(key).collect()));
+            tracks.push((path_of(&field, &name), kept.iter().map(key).collect()));
         }
         (tracks, end)
     }
@@ -126,7 +127,8 @@ mod tests {
         assert_eq!(paths, ["head.yawDegrees", "shapes.jawOpen"], "what stays 0 is left out");
         assert_eq!(tracks[0].1.len(), 2, "a straight line has two keys");
         let keys = &tracks[1].1;
-        assert!(keys.len() < 120, "{}", keys.len());
+        // A line of length h is off by h^2 / 8 of the second derivative: 118 keys where it is largest all the time.
+        assert!(keys.len() < 150, "{}", keys.len());
         let track = rubor_rig::timeline::Track::Keys(keys.clone());
         for i in 0..600 {
             let at = track.at(2.0 + f64::from(i) / 60.0);
