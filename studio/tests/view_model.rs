@@ -10,7 +10,6 @@ use rubor::view::live::Weights;
 use rubor::view::messages::About;
 use rubor::view::model::{Files, Model};
 use rubor::view::pose::Group;
-use rubor::view::script::resident_bytes;
 use rubor::view::tracks::path_of;
 use rubor_renderer::settings::Settings;
 use rubor_rig::timeline::{Ease, Track};
@@ -288,24 +287,4 @@ fn live_weights_take_any_spelling_and_strange_names_get_the_nearest() {
     s.model.hold(Group::Expressions, "joy", 0.1);
     assert_eq!(s.weight(Group::Expressions, "joy"), 0.1, "a hand wins over what arrives");
     assert!(!s.model.document.is_changed());
-}
-
-#[test]
-fn a_thousand_reloads_leave_memory_as_it_is() {
-    let mut s = Session::new();
-    let mut start = 0;
-    for i in 0..1000u32 {
-        let text = RIG.replace("\"mouthSmileLeft\": 1.0", &format!("\"mouthSmileLeft\": {}", f64::from(i) / 1000.0));
-        std::fs::write(s.path(Kind::Rig), text).expect("a file");
-        s.model.reload(Kind::Rig);
-        assert_eq!(s.model.messages.errors().count(), 0);
-        // The history holds so many steps.
-        if i == 199 {
-            start = resident_bytes().unwrap_or_default();
-        }
-    }
-    let end = resident_bytes().unwrap_or_default();
-    eprintln!("resident: {} KiB after 200 reloads, {} KiB after 1000", start >> 10, end >> 10);
-    assert!(end < start + (4 << 20), "{start} to {end} bytes");
-    assert_eq!(s.text(Kind::Rig).matches("0.999").count(), 1);
 }
