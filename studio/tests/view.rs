@@ -26,8 +26,11 @@ impl Display {
         {
             Ok(child) => child,
             Err(_) => {
-                writeln!(std::io::stderr(), "SKIPPED: no Xvfb (`make xvfb` installs it on Debian and Ubuntu)")
-                    .expect("stderr is open");
+                writeln!(
+                    std::io::stderr(),
+                    "SKIPPED: no Xvfb (`make xvfb` installs it on Debian and Ubuntu)"
+                )
+                .expect("stderr is open");
                 return None;
             }
         };
@@ -185,8 +188,21 @@ fn a_session_from_opening_to_closing() {
     for (rig, name) in [(RIG, "keyed.png"), (&softer, "softer.png")] {
         window.write("rig.json", rig);
         let drawn = window.command(&[
-            "render", "--rig", "rig.json", "--sequence", "sequence.json", "--preset", "draft", "--size", "192x192",
-            "--frames", "5", "--no-video", "--no-export", "-o", name.trim_end_matches(".png"),
+            "render",
+            "--rig",
+            "rig.json",
+            "--sequence",
+            "sequence.json",
+            "--preset",
+            "draft",
+            "--size",
+            "192x192",
+            "--frames",
+            "5",
+            "--no-video",
+            "--no-export",
+            "-o",
+            name.trim_end_matches(".png"),
         ]);
         done(&drawn);
         let frame = window.path(name.trim_end_matches(".png")).join("frame.0005.png");
@@ -210,8 +226,13 @@ fn closing_with_changes_asks_and_a_lost_device_keeps_the_work() {
         [&first[..], last].concat()
     };
     let flags = ["--preset", "draft", "--size", "64x64"];
-    let steps = changes(&[json!({ "close": true }), json!({ "click": "button Cancel" }), json!({ "close": true }),
-        json!({ "screenshot": "question.png" }), json!({ "click": "button Save and close" })]);
+    let steps = changes(&[
+        json!({ "close": true }),
+        json!({ "click": "button Cancel" }),
+        json!({ "close": true }),
+        json!({ "screenshot": "question.png" }),
+        json!({ "click": "button Save and close" }),
+    ]);
     done(&window.view(&flags, &steps));
     let saved = window.read("sequence.json");
     assert!(saved.contains("\"v\": 0.7"), "{saved}");

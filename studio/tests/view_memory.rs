@@ -23,7 +23,8 @@ fn a_thousand_reloads_leave_memory_as_it_is() {
     let path = folder.path().join("rig.json");
     std::fs::write(&path, RIG).expect("a file");
     let sequence = folder.path().join("sequence.json");
-    std::fs::write(&sequence, r#"{ "fps": 4, "duration": 2, "expressions": { "joy": 0.5 } }"#).expect("a file");
+    std::fs::write(&sequence, r#"{ "fps": 4, "duration": 2, "expressions": { "joy": 0.5 } }"#)
+        .expect("a file");
     let files = Files { rig: Some(path.clone()), sequence: Some(sequence), head: None };
     let mut model = Model::open(&files, |_| Ok(Settings::default())).expect("a session");
     let mut start = 0;

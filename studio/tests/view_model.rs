@@ -98,12 +98,14 @@ fn a_slider_becomes_a_key_that_undo_takes_back_and_save_writes() {
     }
     s.model.key_held().expect("keys");
     assert!(s.model.pose.is_empty(), "what has a key is let go");
-    let text = SEQUENCE.replace("{ \"t\": 0, \"v\": 0 }, {", "{ \"t\": 0, \"v\": 0 }, { \"t\": 0.5, \"v\": 0.75 }, {");
+    let text = SEQUENCE
+        .replace("{ \"t\": 0, \"v\": 0 }, {", "{ \"t\": 0, \"v\": 0 }, { \"t\": 0.5, \"v\": 0.75 }, {");
     assert_eq!(s.text(Kind::Sequence), text, "the track of both halves has a key more and nothing else");
     s.model.hold(Group::Expressions, "joy", 0.3);
     s.model.key_held().expect("keys");
     let line = "      { \"t\": 0, \"v\": 0, \"ease\": \"smooth\" }, // calm\n";
-    let text = text.replace(line, &format!("{line}      {{ \"t\": 0.5, \"v\": 0.3, \"ease\": \"smooth\" }},\n"));
+    let text =
+        text.replace(line, &format!("{line}      {{ \"t\": 0.5, \"v\": 0.3, \"ease\": \"smooth\" }},\n"));
     assert_eq!(s.text(Kind::Sequence), text, "a new key goes on as the one before it");
     s.model.undo();
     s.model.undo();
@@ -192,7 +194,8 @@ fn files_are_read_again_and_broken_ones_leave_the_last_good_state() {
     let mut s = Session::new();
     s.model.seek(1.0);
     let before = s.model.shot();
-    std::fs::write(s.path(Kind::Rig), RIG.replace("\"hemoglobinScale\": 1.2", "\"hemoglobinScale\": oops")).expect("a file");
+    std::fs::write(s.path(Kind::Rig), RIG.replace("\"hemoglobinScale\": 1.2", "\"hemoglobinScale\": oops"))
+        .expect("a file");
     s.model.reload(Kind::Rig);
     let error = s.error(About::File(Kind::Rig)).expect("an error");
     assert!(error.contains("rig.json:7:63"), "{error}");
@@ -230,7 +233,9 @@ fn changes_on_both_sides_are_a_choice() {
     let mut s = Session::new();
     for takes_file in [false, true] {
         let mine = s.text(Kind::Rig).to_owned();
-        s.model.set_hemoglobin_scale((Group::States, "blush"), if takes_file { 1.5 } else { 1.4 }).expect("an edit");
+        s.model
+            .set_hemoglobin_scale((Group::States, "blush"), if takes_file { 1.5 } else { 1.4 })
+            .expect("an edit");
         let edited = s.text(Kind::Rig).to_owned();
         assert_ne!(mine, edited);
         let theirs = RIG.replace("// A smile.", if takes_file { "// Theirs." } else { "// Also theirs." });
@@ -264,7 +269,10 @@ fn a_text_without_a_file_asks_for_one_and_is_rescued() {
     model.key_held().expect("a key");
     let rescued = model.document.rescue().expect("a copy");
     assert_eq!(rescued, [Path::new(&format!("{}.unsaved", path.display()))]);
-    assert_eq!(std::fs::read_to_string(&rescued[0]).expect("a copy"), model.document.part(Kind::Sequence).text());
+    assert_eq!(
+        std::fs::read_to_string(&rescued[0]).expect("a copy"),
+        model.document.part(Kind::Sequence).text()
+    );
     assert_ne!(std::fs::read_to_string(&path).expect("the file"), model.document.part(Kind::Sequence).text());
 }
 

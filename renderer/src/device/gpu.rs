@@ -195,7 +195,16 @@ impl Gpu {
         // Each shader has at most eight other buffers.
         let stores_uniforms = info.device_type == wgpu::DeviceType::Cpu
             && device.limits().max_storage_buffers_per_shader_stage >= 12;
-        Self { device, queue, info, has_timestamps, stores_uniforms, failure, is_lost, wanted: Arc::default() }
+        Self {
+            device,
+            queue,
+            info,
+            has_timestamps,
+            stores_uniforms,
+            failure,
+            is_lost,
+            wanted: Arc::default(),
+        }
     }
 
     /// The first error that the device reported since the last call.

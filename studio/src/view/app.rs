@@ -259,7 +259,11 @@ impl App {
     ///
     /// # Errors
     /// It is in use.
-    pub(crate) fn listen(&mut self, ctx: &egui::Context, address: std::net::SocketAddr) -> Result<(), Failure> {
+    pub(crate) fn listen(
+        &mut self,
+        ctx: &egui::Context,
+        address: std::net::SocketAddr,
+    ) -> Result<(), Failure> {
         self.listening = None;
         let (live, count) = Live::listen(address, waker(ctx))?;
         self.model.messages.info(format!("listening to {}", live.address));
@@ -281,7 +285,8 @@ impl App {
         let sequence = self.model.document.sequence();
         if let Some(path) = &self.model.document.part(Kind::Sequence).path {
             let folder = path.parent().map(std::path::Path::to_owned).unwrap_or_default();
-            let capture = sequence.capture.iter().flat_map(|c| [Some(&c.file), c.retarget.as_ref()]).flatten();
+            let capture =
+                sequence.capture.iter().flat_map(|c| [Some(&c.file), c.retarget.as_ref()]).flatten();
             files.extend(capture.map(|file| (Role::Sequence, folder.join(file))));
         }
         if let Some(environment) = &self.model.composed().environment
@@ -376,7 +381,13 @@ impl App {
                 let done = self.model.edit(|model| {
                     if end_s > model.duration_s() {
                         let end = super::syntax::number(end_s, 4);
-                        model.document.set(Kind::Sequence, &[Step::from("duration")], &end, "recording", Some("r"))?;
+                        model.document.set(
+                            Kind::Sequence,
+                            &[Step::from("duration")],
+                            &end,
+                            "recording",
+                            Some("r"),
+                        )?;
                     }
                     model.document.set_tracks(&tracks, "recording", Some("r"))?;
                     model.document.seal();
@@ -680,7 +691,8 @@ impl App {
         } else if key(Key::Delete) {
             panels::timeline::delete_selected(self);
         } else if key(Key::R) {
-            self.model.view = super::model::View { lights: self.model.view.lights.clone(), ..Default::default() };
+            self.model.view =
+                super::model::View { lights: self.model.view.lights.clone(), ..Default::default() };
             self.model.compose();
         }
     }

@@ -179,7 +179,14 @@ impl Document {
     ///
     /// # Errors
     /// The result would be wrong; nothing has changed then.
-    pub fn set(&mut self, kind: Kind, path: &[Step], value: &str, label: &str, mark: Option<&str>) -> Outcome {
+    pub fn set(
+        &mut self,
+        kind: Kind,
+        path: &[Step],
+        value: &str,
+        label: &str,
+        mark: Option<&str>,
+    ) -> Outcome {
         let text = syntax::set(self.part(kind).text(), path, value).map_err(Failure::input)?;
         self.replace(kind, text, label, mark)
     }

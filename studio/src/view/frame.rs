@@ -12,8 +12,8 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
 use std::time::Instant;
 
-use eframe::egui_wgpu::RenderState;
 use eframe::egui;
+use eframe::egui_wgpu::RenderState;
 use image::RgbImage;
 use rubor_renderer::channels::{Channel, ChannelData};
 use rubor_renderer::settings::{DetailMethod, ScatterMethod, Settings};
@@ -245,11 +245,7 @@ impl Picture {
         self.gpu().queue.write_texture(
             texture.as_image_copy(),
             &frame.image.rgba,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(4 * size[0]),
-                rows_per_image: None,
-            },
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * size[0]), rows_per_image: None },
             wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
         );
         self.times.passes_ms.clone_from(&frame.stats.passes_ms);

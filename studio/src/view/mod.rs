@@ -80,7 +80,10 @@ pub fn open(options: Options) -> Outcome {
             .with_app_id("rubor")
             .with_inner_size(vec2(window[0], window[1]))
             .with_min_inner_size(vec2(720.0, 480.0)),
-        wgpu_options: WgpuConfiguration { wgpu_setup: WgpuSetup::CreateNew(setup), ..WgpuConfiguration::default() },
+        wgpu_options: WgpuConfiguration {
+            wgpu_setup: WgpuSetup::CreateNew(setup),
+            ..WgpuConfiguration::default()
+        },
         ..eframe::NativeOptions::default()
     };
     let outcome: Arc<Mutex<Option<Failure>>> = Arc::default();

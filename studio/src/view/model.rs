@@ -342,7 +342,8 @@ impl Model {
     pub fn mirror(&mut self) {
         for group in [Group::Shapes, Group::Zones] {
             let (names, weights) = (self.names(group), self.weights(group));
-            let pairs = if group == Group::Shapes { self.shape_pairs.clone() } else { self.zone_pairs.clone() };
+            let pairs =
+                if group == Group::Shapes { self.shape_pairs.clone() } else { self.zone_pairs.clone() };
             for (i, other) in pairs.iter().enumerate().filter_map(|(i, p)| Some((i, (*p)?))) {
                 if weights[i] != weights[other] {
                     self.pose.of_mut(group).insert(names[i].clone(), weights[other]);
@@ -413,7 +414,8 @@ impl Model {
                 continue;
             }
             if targets.iter().any(|t| t.factor != 1.0) {
-                let message = format!("{shape}: the track {track:?} moves it in part; set keys of that track");
+                let message =
+                    format!("{shape}: the track {track:?} moves it in part; set keys of that track");
                 return Err(Failure::input(message));
             }
             let weight = |t: &rubor_rig::names::Target| weights.get(t.index as usize).copied();
@@ -558,7 +560,10 @@ impl Model {
         match self.document.reload(kind) {
             Ok(Reload::Conflict) => {
                 let label = self.document.part(kind).label(kind);
-                self.messages.error(about, format!("{label} was changed by another program; this text has changes too"));
+                self.messages.error(
+                    about,
+                    format!("{label} was changed by another program; this text has changes too"),
+                );
             }
             Ok(outcome) => {
                 self.messages.clear(about);
@@ -657,8 +662,7 @@ impl Model {
             }
         }
         self.live.shapes.extend(sums);
-        for (group, weights) in
-            [(Group::Expressions, &weights.expressions), (Group::States, &weights.states)]
+        for (group, weights) in [(Group::Expressions, &weights.expressions), (Group::States, &weights.states)]
         {
             let names = self.names(group);
             for (name, weight) in weights {

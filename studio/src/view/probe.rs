@@ -23,7 +23,7 @@ struct Probe {
 }
 
 fn with<T>(ctx: &egui::Context, what: impl FnOnce(&mut Probe) -> T) -> T {
-    ctx.data_mut(|data| what(data.get_temp_mut_or_default::<Probe>(Id::new("rubor probe"))))
+    ctx.data_mut(|data| what(data.get_temp_mut_or_default::<Probe>(Id::unique("rubor probe"))))
 }
 
 /// Begins to note widgets.

@@ -170,7 +170,11 @@ impl Script {
                     Pos2::new(found.rect.left() + share * found.rect.width(), from.y)
                 }
                 (_, _, Some([x, y])) => from + vec2(x, y),
-                _ => return Err(Failure::input(format!("script: {name:?} is dragged `to` a value or `by` points"))),
+                _ => {
+                    return Err(Failure::input(format!(
+                        "script: {name:?} is dragged `to` a value or `by` points"
+                    )));
+                }
             };
             self.drag(from, to, line);
             return Ok(true);
@@ -188,8 +192,10 @@ impl Script {
             return Ok(true);
         }
         if let Some(name) = &line.press {
-            let key = Key::from_name(name).ok_or_else(|| Failure::input(format!("script: no key {name:?}")))?;
-            let modifiers = Modifiers { ctrl: line.ctrl, command: line.ctrl, shift: line.shift, ..Modifiers::NONE };
+            let key =
+                Key::from_name(name).ok_or_else(|| Failure::input(format!("script: no key {name:?}")))?;
+            let modifiers =
+                Modifiers { ctrl: line.ctrl, command: line.ctrl, shift: line.shift, ..Modifiers::NONE };
             for pressed in [true, false] {
                 let event = Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
                 self.moves.push_back(vec![Event::ModifiersChanged(modifiers), event]);
@@ -263,7 +269,8 @@ impl Script {
             Some(found) => Ok(Some(found)),
             None if self.frames < FRAMES => Ok(None),
             None => {
-                let near = probe::nearest(ctx, name).map(|n| format!("; did you mean {n:?}?")).unwrap_or_default();
+                let near =
+                    probe::nearest(ctx, name).map(|n| format!("; did you mean {n:?}?")).unwrap_or_default();
                 Err(Failure::input(format!("there is no widget {name:?} in view{near}")))
             }
         }
@@ -275,7 +282,8 @@ impl Script {
         self.moves.push_back(vec![pressed(from, button, true)]);
         for i in 1..=4 {
             // Some way around at first, so that it counts as a drag even where it ends near its start.
-            let on_way = from.lerp(to, i as f32 / 4.0) + if i == 1 { vec2(12.0, 0.0) } else { vec2(0.0, 0.0) };
+            let on_way =
+                from.lerp(to, i as f32 / 4.0) + if i == 1 { vec2(12.0, 0.0) } else { vec2(0.0, 0.0) };
             self.moves.push_back(vec![Event::PointerMoved(on_way)]);
         }
         self.moves.push_back(vec![Event::PointerMoved(to)]);
@@ -292,7 +300,8 @@ impl Script {
         let at = Pos2::new(found.rect.left() + share * found.rect.width(), found.rect.center().y);
         if drawn >= u64::from(frames) {
             let seconds = start.elapsed().as_secs_f64();
-            self.measured = Some(Measured { frames: drawn, seconds, frames_per_second: drawn as f64 / seconds });
+            self.measured =
+                Some(Measured { frames: drawn, seconds, frames_per_second: drawn as f64 / seconds });
             self.measuring = None;
             self.moves.push_back(vec![pressed(at, PointerButton::Primary, false)]);
             return Ok(true);
@@ -317,7 +326,9 @@ impl Script {
             ctx.send_viewport_cmd(ViewportCommand::Screenshot(callback));
             return Ok(false);
         }
-        let Some(image) = self.screenshot.lock().ok().and_then(|mut slot| slot.take()) else { return Ok(false) };
+        let Some(image) = self.screenshot.lock().ok().and_then(|mut slot| slot.take()) else {
+            return Ok(false);
+        };
         let [width, height] = image.size.map(|n| n as u32);
         let rgb: Vec<u8> = image.pixels.iter().flat_map(|p| [p.r(), p.g(), p.b()]).collect();
         let picture = image::RgbImage::from_raw(width, height, rgb)

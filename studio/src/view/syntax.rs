@@ -140,9 +140,11 @@ fn parse(text: &str) -> Result<(&str, CstRootNode), EditError> {
         allow_non_finite_numbers: false,
         allow_extended_string_escapes: false,
     };
-    CstRootNode::parse(text, &options)
-        .map(|root| (mark, root))
-        .map_err(|e| EditError { at: "text".into(), found: e.to_string(), expected: "JSON" })
+    CstRootNode::parse(text, &options).map(|root| (mark, root)).map_err(|e| EditError {
+        at: "text".into(),
+        found: e.to_string(),
+        expected: "JSON",
+    })
 }
 
 /// The value at a path. `makes`: missing objects are added.
@@ -226,7 +228,8 @@ mod tests {
 
     #[test]
     fn missing_objects_are_made_and_what_has_no_place_is_said() {
-        let made = set("{\n  \"fps\": 24\n}\n", &path(&["shapes", "jawOpen"]), "[{ \"t\": 0, \"v\": 1 }]").unwrap();
+        let made =
+            set("{\n  \"fps\": 24\n}\n", &path(&["shapes", "jawOpen"]), "[{ \"t\": 0, \"v\": 1 }]").unwrap();
         let value: serde_json::Value = serde_json::from_str(&made).unwrap();
         assert_eq!(value["shapes"]["jawOpen"][0]["v"], 1);
         assert!(made.starts_with("{\n  \"fps\": 24,\n"), "{made}");

@@ -69,9 +69,12 @@ pub(crate) fn set(ctx: &egui::Context) {
         style.spacing.window_margin = Margin::same(10);
         style.spacing.combo_width = 90.0;
         style.spacing.scroll = egui::style::ScrollStyle::thin();
-        for (text, size) in
-            [(TextStyle::Small, 11.0), (TextStyle::Body, 12.5), (TextStyle::Button, 12.5), (TextStyle::Heading, 14.0)]
-        {
+        for (text, size) in [
+            (TextStyle::Small, 11.0),
+            (TextStyle::Body, 12.5),
+            (TextStyle::Button, 12.5),
+            (TextStyle::Heading, 14.0),
+        ] {
             style.text_styles.insert(text, FontId::proportional(size));
         }
         style.text_styles.insert(TextStyle::Monospace, FontId::monospace(11.5));

@@ -61,10 +61,20 @@ pub fn rows<'a>(sequence: &'a Sequence) -> Vec<Row<'a>> {
     ] {
         for (name, track) in tracks {
             let values = Values::Numbers(track);
-            rows.push(Row { path: path_of(field, name), label: name.clone(), group, values, range: [0.0, most] });
+            rows.push(Row {
+                path: path_of(field, name),
+                label: name.clone(),
+                group,
+                values,
+                range: [0.0, most],
+            });
         }
     }
-    let mut single = |path: [&str; 2], label: &str, group: &'static str, track: &'a Track<f32>, range: [f32; 2]| {
+    let mut single = |path: [&str; 2],
+                      label: &str,
+                      group: &'static str,
+                      track: &'a Track<f32>,
+                      range: [f32; 2]| {
         if *track != Track::Constant(0.0) {
             let path = path.map(Step::from).to_vec();
             rows.push(Row { path, label: label.to_owned(), group, values: Values::Numbers(track), range });
@@ -90,13 +100,14 @@ pub fn rows<'a>(sequence: &'a Sequence) -> Vec<Row<'a>> {
         single(["environment", "rotationDegrees"], "turn", "Surroundings", turn, [-180.0, 180.0]);
         single(["environment", "intensity"], "intensity", "Surroundings", intensity, [0.0, 4.0]);
     }
-    let mut triple = |path: [&str; 2], label: &str, group: &'static str, track: Option<&'a Track<[f32; 3]>>| {
-        if let Some(track @ Track::Keys(_)) = track {
-            let path = path.map(Step::from).to_vec();
-            let values = Values::Triples(track);
-            rows.push(Row { path, label: label.to_owned(), group, values, range: [0.0, 1.0] });
-        }
-    };
+    let mut triple =
+        |path: [&str; 2], label: &str, group: &'static str, track: Option<&'a Track<[f32; 3]>>| {
+            if let Some(track @ Track::Keys(_)) = track {
+                let path = path.map(Step::from).to_vec();
+                let values = Values::Triples(track);
+                rows.push(Row { path, label: label.to_owned(), group, values, range: [0.0, 1.0] });
+            }
+        };
     triple(["head", "translation"], "translation", "Head", Some(&head.translation));
     triple(["camera", "position"], "position", "Camera", camera.position.as_ref());
     triple(["camera", "target"], "target", "Camera", camera.target.as_ref());
@@ -113,7 +124,8 @@ pub fn numbers<'a>(sequence: &'a Sequence, path: &[Step]) -> Option<&'a Track<f3
 
 /// Keys as text, one a line, as deep as a track of an expression is.
 pub fn keys_text(keys: &[Key<f32>]) -> String {
-    let lines: Vec<String> = keys.iter().map(|k| format!("      {},\n", key_text(k.t, k.v, k.ease))).collect();
+    let lines: Vec<String> =
+        keys.iter().map(|k| format!("      {},\n", key_text(k.t, k.v, k.ease))).collect();
     format!("[\n{}    ]", lines.concat())
 }
 

@@ -85,13 +85,11 @@ impl Watcher {
         let mut before = std::mem::take(&mut shared.files);
         shared.files = files
             .into_iter()
-            .map(|(role, path)| {
-                match before.iter().position(|w| w.role == role && w.path == path) {
-                    Some(i) => before.swap_remove(i),
-                    None => {
-                        let stamp = stamp(&path);
-                        Watched { role, path, known: stamp, seen: stamp }
-                    }
+            .map(|(role, path)| match before.iter().position(|w| w.role == role && w.path == path) {
+                Some(i) => before.swap_remove(i),
+                None => {
+                    let stamp = stamp(&path);
+                    Watched { role, path, known: stamp, seen: stamp }
                 }
             })
             .collect();
@@ -141,9 +139,8 @@ fn stamp(path: &Path) -> Stamp {
 /// A head's file and those that it may name: textures, buffers and materials in its folder and the folders in it. A head in
 /// one file (`.glb`, `.vrm`, `.usdz`) names none.
 pub fn files_of_head(path: &Path) -> Vec<PathBuf> {
-    let ending = |path: &Path| {
-        path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
-    };
+    let ending =
+        |path: &Path| path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let mut files = vec![path.to_owned()];
     if !["gltf", "obj", "usda"].contains(&ending(path).as_str()) {
         return files;

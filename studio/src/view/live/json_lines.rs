@@ -63,7 +63,9 @@ pub(super) fn read(mut stream: TcpStream, from: &str, post: &Post) {
         let length = match stream.read(&mut bytes) {
             Ok(0) => break,
             Ok(length) => length,
-            Err(e) if matches!(e.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => continue,
+            Err(e) if matches!(e.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {
+                continue;
+            }
             Err(_) => break,
         };
         waiting.extend_from_slice(&bytes[..length]);
@@ -93,7 +95,9 @@ pub(super) fn read(mut stream: TcpStream, from: &str, post: &Post) {
             }
         }
         if waiting.len() > LONGEST_LINE {
-            post.send(Event::Wrong(format!("{name}: a line of more than {LONGEST_LINE} bytes; disconnected")));
+            post.send(Event::Wrong(format!(
+                "{name}: a line of more than {LONGEST_LINE} bytes; disconnected"
+            )));
             break;
         }
     }

@@ -15,9 +15,9 @@ mod open_sound;
 mod recorder;
 
 use std::net::{SocketAddr, TcpListener, UdpSocket};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub use recorder::Recorder;
@@ -99,7 +99,10 @@ impl Live {
     ///
     /// # Errors
     /// The address is in use, or is not one of this machine.
-    pub fn listen(address: SocketAddr, wake: impl Fn() + Send + Sync + 'static) -> Outcome<(Self, LiveCount)> {
+    pub fn listen(
+        address: SocketAddr,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Outcome<(Self, LiveCount)> {
         let refused = |what: &str, e: std::io::Error| {
             let hint = "another program, perhaps another `rubor view`, listens there: end it, or take another port, such as \
                         `--live 127.0.0.1:0` for a free one";
@@ -196,7 +199,10 @@ mod tests {
     fn one_port_takes_lines_and_datagrams_and_is_busy_for_others() {
         let (live, count) = Live::listen("127.0.0.1:0".parse().unwrap(), || ()).unwrap();
         let busy = Live::listen(live.address, || ()).map(|_| ()).unwrap_err();
-        assert!(busy.to_string().contains(&live.address.to_string()) && busy.to_string().contains("hint"), "{busy}");
+        assert!(
+            busy.to_string().contains(&live.address.to_string()) && busy.to_string().contains("hint"),
+            "{busy}"
+        );
         let mut maya = std::net::TcpStream::connect(live.address).unwrap();
         maya.write_all(b"{\"from\":\"maya\",\"type\":\"hello\",\"version\":1}\n{\"head\":{\"pitchDegrees\":1,\"rollDegrees\":2,\"yawDegrees\":4},\"shapes\":{\"jawOpen\":0.3},\"type\":\"weights\"}\nnonsense\n{\"type\":\"bye\"}\n").unwrap();
         let events = wait(&live, &count, 4);

@@ -9,14 +9,15 @@
 //!
 //! Weights by number, as some apps send them, are refused: the number says nothing of the shape.
 
-use rosc::{OscMessage, OscPacket, OscType};
 use super::Weights;
+use rosc::{OscMessage, OscPacket, OscType};
 
 /// Bundles in bundles.
 const DEEPEST: usize = 8;
 /// The weights of a datagram.
 pub(super) fn weights(datagram: &[u8]) -> Result<Weights, String> {
-    let (_, packet) = rosc::decoder::decode_udp(datagram).map_err(|e| format!("no Open Sound Control: {e}"))?;
+    let (_, packet) =
+        rosc::decoder::decode_udp(datagram).map_err(|e| format!("no Open Sound Control: {e}"))?;
     let mut weights = Weights::default();
     take(&packet, &mut weights, 0)?;
     Ok(weights)
@@ -25,7 +26,9 @@ pub(super) fn weights(datagram: &[u8]) -> Result<Weights, String> {
 fn take(packet: &OscPacket, weights: &mut Weights, depth: usize) -> Result<(), String> {
     match packet {
         OscPacket::Message(message) => message_weights(message, weights),
-        OscPacket::Bundle(_) if depth >= DEEPEST => Err(format!("more than {DEEPEST} bundles in one another")),
+        OscPacket::Bundle(_) if depth >= DEEPEST => {
+            Err(format!("more than {DEEPEST} bundles in one another"))
+        }
         OscPacket::Bundle(bundle) => {
             bundle.content.iter().try_for_each(|inner| take(inner, weights, depth + 1))
         }
@@ -82,7 +85,10 @@ mod tests {
     fn the_dialects_of_the_field_are_read() {
         let float = OscType::Float;
         let shapes = |w: Result<Weights, String>| w.unwrap().shapes;
-        assert_eq!(shapes(sent("/avatar/parameters/JawOpen", vec![float(0.3)])), [("JawOpen".to_owned(), 0.3)]);
+        assert_eq!(
+            shapes(sent("/avatar/parameters/JawOpen", vec![float(0.3)])),
+            [("JawOpen".to_owned(), 0.3)]
+        );
         let vmc = sent("/VMC/Ext/Blend/Val", vec![OscType::String("A".into()), float(1.0)]);
         assert_eq!(shapes(vmc), [("A".to_owned(), 1.0)]);
         assert_eq!(sent("/VMC/Ext/Blend/Apply", vec![]).unwrap(), Weights::default());
@@ -98,8 +104,11 @@ mod tests {
 
     #[test]
     fn bundles_are_opened_to_a_depth() {
-        let message = |v| OscPacket::Message(OscMessage { addr: "/jawOpen".into(), args: vec![OscType::Float(v)] });
-        let bundle = |content| OscPacket::Bundle(OscBundle { timetag: OscTime { seconds: 0, fractional: 1 }, content });
+        let message =
+            |v| OscPacket::Message(OscMessage { addr: "/jawOpen".into(), args: vec![OscType::Float(v)] });
+        let bundle = |content| {
+            OscPacket::Bundle(OscBundle { timetag: OscTime { seconds: 0, fractional: 1 }, content })
+        };
         let two = encoder::encode(&bundle(vec![message(0.1), message(0.2)])).unwrap();
         assert_eq!(weights(&two).unwrap().shapes.len(), 2);
         let deep = (0..20).fold(message(0.1), |inner, _| bundle(vec![inner]));

@@ -123,7 +123,8 @@ mod tests {
         }
         let (tracks, end) = recorder.tracks();
         assert!((end - (2.0 + 599.0 / 60.0)).abs() < 1e-6, "{end}");
-        let paths: Vec<_> = tracks.iter().map(|(path, _)| super::super::super::syntax::written(path)).collect();
+        let paths: Vec<_> =
+            tracks.iter().map(|(path, _)| super::super::super::syntax::written(path)).collect();
         assert_eq!(paths, ["head.yawDegrees", "shapes.jawOpen"], "what stays 0 is left out");
         assert_eq!(tracks[0].1.len(), 2, "a straight line has two keys");
         let keys = &tracks[1].1;

@@ -46,7 +46,7 @@ impl Dialog {
 /// Shows the question, if one is asked.
 pub(crate) fn show(app: &mut App, ctx: &egui::Context) {
     let Some(mut dialog) = app.dialog.take() else { return };
-    let modal = Modal::new(Id::new("dialog")).show(ctx, |ui| {
+    let modal = Modal::new(Id::unique("dialog")).show(ctx, |ui| {
         ui.set_width(440.0);
         match &mut dialog {
             Dialog::SaveAs { kind, path } => save_as(app, ui, *kind, path),
@@ -70,7 +70,9 @@ fn save_as(app: &mut App, ui: &mut Ui, kind: Kind, path: &mut String) -> bool {
     ui.heading(format!("Save the {} as", kind.name()));
     let entered = field(ui, path);
     ui.horizontal(|ui| {
-        if ui.input(|i| i.key_pressed(Key::Enter)) && entered || button(ui, "Write", "Writes the file").clicked() {
+        if ui.input(|i| i.key_pressed(Key::Enter)) && entered
+            || button(ui, "Write", "Writes the file").clicked()
+        {
             let saved = app.model.save_one(kind, Some(Path::new(path.trim())));
             app.saved();
             return saved;
@@ -84,7 +86,9 @@ fn picture(app: &mut App, ui: &mut Ui, path: &mut String) -> bool {
     ui.heading("Write the picture as");
     let entered = field(ui, path);
     ui.horizontal(|ui| {
-        if ui.input(|i| i.key_pressed(Key::Enter)) && entered || button(ui, "Write", "Writes the file").clicked() {
+        if ui.input(|i| i.key_pressed(Key::Enter)) && entered
+            || button(ui, "Write", "Writes the file").clicked()
+        {
             write_picture(app, Path::new(path.trim()));
             return true;
         }

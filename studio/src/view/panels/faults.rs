@@ -15,7 +15,7 @@ pub(crate) fn show(app: &mut App, ui: &Ui, at: Pos2, width: f32) {
     if errors.is_empty() {
         return;
     }
-    let area = Area::new(Id::new("faults")).order(Order::Middle).fixed_pos(at).pivot(Align2::LEFT_TOP);
+    let area = Area::new(Id::unique("faults")).order(Order::Middle).fixed_pos(at).pivot(Align2::LEFT_TOP);
     area.show(ui.ctx(), |ui| {
         ui.set_max_width(width);
         let frame = Frame::new()
@@ -27,9 +27,15 @@ pub(crate) fn show(app: &mut App, ui: &Ui, at: Pos2, width: f32) {
             for (about, text) in &errors {
                 ui.label(RichText::new(text).monospace().color(Color32::from_rgb(0xff, 0xd9, 0xd4)));
                 match about {
-                    About::File(kind) if app.model.document.part(*kind).has_conflict() => choice(app, ui, *kind),
+                    About::File(kind) if app.model.document.part(*kind).has_conflict() => {
+                        choice(app, ui, *kind)
+                    }
                     About::File(_) | About::Scene | About::Head => {
-                        ui.label(RichText::new("The picture shows the last good state.").small().color(theme::ERROR));
+                        ui.label(
+                            RichText::new("The picture shows the last good state.")
+                                .small()
+                                .color(theme::ERROR),
+                        );
                     }
                     About::Edit | About::Save | About::Live | About::Reference | About::Screenshot => {
                         if button(ui, "Dismiss", "Takes this message away").clicked() {

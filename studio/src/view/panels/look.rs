@@ -33,7 +33,9 @@ pub(crate) fn camera(app: &mut App, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.label(RichText::new("distance").color(theme::WEAK));
         ui.add_space((112.0 - ui.min_rect().width()).max(0.0));
-        ui.add(DragValue::new(&mut view.distance).range(0.1..=10.0).speed(0.005).max_decimals(2).suffix(" x"));
+        ui.add(
+            DragValue::new(&mut view.distance).range(0.1..=10.0).speed(0.005).max_decimals(2).suffix(" x"),
+        );
     });
     if *view != before {
         app.model.compose();
@@ -137,7 +139,8 @@ pub(crate) fn light(app: &mut App, ui: &mut Ui) {
         ui.label(RichText::new("surroundings").color(theme::WEAK));
         ui.add_space((112.0 - ui.min_rect().width()).max(0.0));
         let turn = &mut app.model.view.environment_turn;
-        let response = ui.add(DragValue::new(turn).range(-180.0..=180.0).suffix("°").speed(1.0).max_decimals(1));
+        let response =
+            ui.add(DragValue::new(turn).range(-180.0..=180.0).suffix("°").speed(1.0).max_decimals(1));
         probe::note(ui, "view surroundings", &response);
     });
     if before != app.model.view.environment_turn {
@@ -192,7 +195,8 @@ pub(crate) fn live(app: &mut App, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.add(TextEdit::singleline(&mut app.chosen.live_address).desired_width(150.0));
         let is_on = app.listening.is_some();
-        let about = "Takes weights from Maya (JSON lines), Open Sound Control and Live Link Face at this address";
+        let about =
+            "Takes weights from Maya (JSON lines), Open Sound Control and Live Link Face at this address";
         if button(ui, if is_on { "Stop" } else { "Listen" }, about).clicked() {
             if is_on {
                 app.listening = None;
@@ -203,7 +207,10 @@ pub(crate) fn live(app: &mut App, ui: &mut Ui) {
                 let address = app.chosen.live_address.trim().parse();
                 let listened = match address {
                     Ok(address) => app.listen(&ctx, address).map_err(|e| e.to_string()),
-                    Err(_) => Err(format!("live: found {:?}, expected ADDRESS:PORT, such as 127.0.0.1:47511", app.chosen.live_address)),
+                    Err(_) => Err(format!(
+                        "live: found {:?}, expected ADDRESS:PORT, such as 127.0.0.1:47511",
+                        app.chosen.live_address
+                    )),
                 };
                 if let Err(e) = listened {
                     app.model.messages.error(About::Live, e);

@@ -26,7 +26,8 @@ pub(crate) fn show_left(app: &mut App, ui: &mut Ui) {
                 }
             }
             let width = ui.available_width();
-            let search = TextEdit::singleline(&mut app.chosen.search).hint_text("search").desired_width(width);
+            let search =
+                TextEdit::singleline(&mut app.chosen.search).hint_text("search").desired_width(width);
             let response = ui.add(search);
             probe::note(ui, "field search", &response);
         });
@@ -78,7 +79,8 @@ fn perform(app: &mut App, ui: &mut Ui) {
                 continue;
             }
             let title = format!("{} ({})", group.heading(), names.len());
-            let header = CollapsingHeader::new(RichText::new(title).strong()).default_open(true).id_salt(group);
+            let header =
+                CollapsingHeader::new(RichText::new(title).strong()).default_open(true).id_salt(group);
             header.show(ui, |ui| {
                 if names.is_empty() {
                     ui.label(RichText::new("none on this head or in this rig").color(theme::WEAK));
@@ -116,7 +118,8 @@ fn rows(names: &[String], search: &str) -> Vec<Row> {
                 None => rows.push(Row::One(i)),
             },
             // Shown with its left half.
-            Some(Side::Right) if other(Side::Left).is_some_and(|l| names[l].to_lowercase().contains(&wanted)) => {}
+            Some(Side::Right)
+                if other(Side::Left).is_some_and(|l| names[l].to_lowercase().contains(&wanted)) => {}
             _ => rows.push(Row::One(i)),
         }
     }
@@ -172,7 +175,9 @@ fn show_row(app: &mut App, ui: &mut Ui, group: Group, names: &[String], weights:
 fn short(name: &str) -> &str {
     let lower = name.to_lowercase();
     let ends = ["left", "_l", "-l", ".l"];
-    ends.iter().find(|end| lower.ends_with(*end)).map_or(name, |end| name[..name.len() - end.len()].trim_end_matches(['-', '_', '.', ' ']))
+    ends.iter()
+        .find(|end| lower.ends_with(*end))
+        .map_or(name, |end| name[..name.len() - end.len()].trim_end_matches(['-', '_', '.', ' ']))
 }
 
 fn show_weight(app: &mut App, ui: &mut Ui, group: Group, name: &str, label: &str, weight: f32, width: f32) {

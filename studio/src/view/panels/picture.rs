@@ -1,6 +1,8 @@
 //! The picture in the middle: orbit by dragging, shift by the middle button, distance by the wheel.
 
-use eframe::egui::{self, Align2, CentralPanel, Color32, FontId, Frame, PointerButton, Pos2, Rect, Sense, TextureId, Ui, vec2};
+use eframe::egui::{
+    self, Align2, CentralPanel, Color32, FontId, Frame, PointerButton, Pos2, Rect, Sense, TextureId, Ui, vec2,
+};
 
 use super::super::app::App;
 use super::super::overlay::{Legend, Overlay, diverging, heat};
@@ -110,7 +112,8 @@ fn legend(app: &App, painter: &egui::Painter, all: Rect) {
                 painter.rect_filled(cell, 0, Color32::from_rgb(r, g, b));
             }
             let at = egui::pos2(bar.left(), corner.y);
-            let text = |at: Pos2, align, text: String| painter.text(at, align, text, font.clone(), theme::TEXT);
+            let text =
+                |at: Pos2, align, text: String| painter.text(at, align, text, font.clone(), theme::TEXT);
             text(at, Align2::LEFT_BOTTOM, number(f64::from(low), 2));
             text(egui::pos2(bar.center().x, corner.y), Align2::CENTER_BOTTOM, unit.to_owned());
             text(egui::pos2(bar.right(), corner.y), Align2::RIGHT_BOTTOM, number(f64::from(high), 2));

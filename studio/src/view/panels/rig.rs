@@ -39,7 +39,8 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
     });
     ui.horizontal(|ui| {
         let width = 130.0;
-        let field = TextEdit::singleline(&mut app.chosen.new_name).hint_text("new expression").desired_width(width);
+        let field =
+            TextEdit::singleline(&mut app.chosen.new_name).hint_text("new expression").desired_width(width);
         let response = ui.add(field);
         probe::note(ui, "field new expression", &response);
         if button(ui, "Add", "Adds an expression of this name to the rig").clicked() {
@@ -129,7 +130,9 @@ fn weights(app: &mut App, ui: &mut Ui, group: Group, owner: &str) {
                         range: [if weight < 0.0 { low } else { 0.0 }, 1.0],
                         fill: theme::FILL,
                         is_held: false,
-                        about: format!("{owner}: {field} {name}\ndrag, or double click for a number, also a negative one"),
+                        about: format!(
+                            "{owner}: {field} {name}\ndrag, or double click for a number, also a negative one"
+                        ),
                     },
                     ui.available_width(),
                 );

@@ -1,6 +1,8 @@
 //! The panel on the right: every setting of a frame, live, with the time of each pass and the error beside them.
 
-use eframe::egui::{CollapsingHeader, ComboBox, DragValue, Frame, Margin, Panel, ProgressBar, RichText, ScrollArea, Ui};
+use eframe::egui::{
+    CollapsingHeader, ComboBox, DragValue, Frame, Margin, Panel, ProgressBar, RichText, ScrollArea, Ui,
+};
 use rubor_renderer::settings::{GROUPS, Group, Leaf, Preset, Settings, leaves};
 use serde_json::Value;
 
@@ -34,7 +36,8 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
 }
 
 fn section(ui: &mut Ui, title: &str, is_open: bool, contents: impl FnOnce(&mut Ui)) {
-    let header = CollapsingHeader::new(RichText::new(title).strong()).default_open(is_open).show(ui, contents);
+    let header =
+        CollapsingHeader::new(RichText::new(title).strong()).default_open(is_open).show(ui, contents);
     probe::note(ui, &format!("section {title}"), &header.header_response);
 }
 
@@ -115,7 +118,8 @@ fn edit(ui: &mut Ui, leaf: &Leaf, value: &Value) -> Option<Value> {
         "integer" => {
             let mut n = value.as_u64().unwrap_or_default();
             let [least, most] = leaf.range.unwrap_or([0.0, 1e6]).map(|n| n as u64);
-            let response = ui.add(DragValue::new(&mut n).range(least..=most).speed(0.02 * n as f64 + 0.05));
+            let speed = 0.02 * n as f64 + 0.05;
+            let response = ui.add(DragValue::new(&mut n).range(least..=most).speed(speed));
             probe::note(ui, &format!("setting {}", leaf.flag()), &response);
             response.changed().then(|| n.into())
         }
@@ -165,7 +169,8 @@ fn names(ui: &mut Ui, leaf: &Leaf, value: &Value) -> Option<Value> {
     let text = value.as_str().unwrap_or("own");
     let mut changed = None;
     let combo = ComboBox::from_id_salt(leaf.flag()).selected_text(text).width(110.0).show_ui(ui, |ui| {
-        let all = leaf.expected.split(|c: char| c == ',' || c.is_whitespace()).filter(|n| leaf.parse(n).is_ok());
+        let all =
+            leaf.expected.split(|c: char| c == ',' || c.is_whitespace()).filter(|n| leaf.parse(n).is_ok());
         for name in all.filter(|n| !n.is_empty()) {
             let response = ui.selectable_label(name == text, name);
             probe::note(ui, &format!("name {name}"), &response);
@@ -210,7 +215,13 @@ fn passes(app: &App, ui: &mut Ui) {
     for (name, ms, count) in sums {
         let times = if count > 1 { format!(" x{count}") } else { String::new() };
         let text = RichText::new(format!("{name}{times}  {ms:.2} ms")).small();
-        ui.add(ProgressBar::new((ms / most) as f32).desired_height(15.0).fill(theme::FILL).corner_radius(2).text(text));
+        ui.add(
+            ProgressBar::new((ms / most) as f32)
+                .desired_height(15.0)
+                .fill(theme::FILL)
+                .corner_radius(2)
+                .text(text),
+        );
     }
     ui.label(RichText::new(format!("all: {:.2} ms on the device", times.frame_ms)).color(theme::WEAK));
 }

@@ -1,6 +1,6 @@
 //! The line at the bottom: what was done last, the time of a frame, the device.
 
-use eframe::egui::{Frame, Layout, Margin, Panel, RichText, ScrollArea, Ui, Window, Align};
+use eframe::egui::{Align, Frame, Layout, Margin, Panel, RichText, ScrollArea, Ui, Window};
 
 use super::super::app::App;
 use super::super::probe;
@@ -29,7 +29,11 @@ pub(crate) fn show(app: &mut App, ui: &mut Ui) {
                 ui.label(format!("{w} x {h}{moving}"));
                 ui.separator();
                 let times = app.picture.times();
-                let gpu = if times.passes_ms.is_empty() { String::new() } else { format!(", passes {:.1} ms", times.frame_ms) };
+                let gpu = if times.passes_ms.is_empty() {
+                    String::new()
+                } else {
+                    format!(", passes {:.1} ms", times.frame_ms)
+                };
                 ui.label(format!("frame {:.0} ms{gpu}", app.picture.frame_ms()));
                 if app.is_moving() {
                     ui.label(RichText::new(format!("{} frames/s", app.pace.per_second())).color(theme::WEAK));

@@ -4,8 +4,8 @@
 //! deleted by Delete; the right button on a key chooses its easing.
 
 use eframe::egui::{
-    self, Align2, Color32, FontId, Frame, Id, Margin, Panel, Pos2, Rect, RichText, ScrollArea, Sense, Shape, Stroke, Ui,
-    pos2, vec2,
+    self, Align2, Color32, FontId, Frame, Id, Margin, Panel, Pos2, Rect, RichText, ScrollArea, Sense, Shape,
+    Stroke, Ui, pos2, vec2,
 };
 use rubor_rig::json::Step;
 use rubor_rig::timeline::{Ease, Track};
@@ -46,49 +46,59 @@ const KEY: f32 = 5.0;
 /// Shows it.
 pub(crate) fn show(app: &mut App, ui: &mut Ui) {
     let frame = Frame::new().fill(theme::PANEL).inner_margin(Margin::symmetric(8, 5));
-    Panel::bottom("time line").frame(frame).resizable(true).default_size(220.0).size_range(120.0..=600.0).show(ui, |ui| {
-        transport(app, ui);
-        ui.add_space(2.0);
-        let shown: Vec<Shown> = app
-            .model
-            .rows()
-            .into_iter()
-            .map(|row| Shown {
-                times: row.times(),
-                numbers: match row.values {
-                    Values::Numbers(track) => Some(track.clone()),
-                    Values::Triples(_) => None,
-                },
-                path: row.path,
-                label: row.label,
-                group: row.group,
-                range: row.range,
-            })
-            .collect();
-        let selected = app.chosen.selection.track.clone();
-        let curve = shown.iter().find(|s| Some(&s.path) == selected.as_ref() && s.numbers.is_some());
-        let all = ui.available_rect_before_wrap();
-        let curve_height = if curve.is_some() { (0.5 * all.height()).clamp(60.0, 240.0) } else { 0.0 };
-        let ruler_rect = Rect::from_min_size(all.min, vec2(all.width(), RULER));
-        ruler(app, ui, ruler_rect);
-        let list = Rect::from_min_max(pos2(all.left(), ruler_rect.bottom()), all.right_bottom() - vec2(0.0, curve_height));
-        ui.scope_builder(egui::UiBuilder::new().max_rect(list), |ui| {
-            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                ui.spacing_mut().item_spacing.y = 1.0;
-                if shown.is_empty() {
-                    ui.label(RichText::new("no tracks yet: move a slider and press K").color(theme::WEAK));
-                }
-                for row in &shown {
-                    track(app, ui, row);
-                }
+    Panel::bottom("time line")
+        .frame(frame)
+        .resizable(true)
+        .default_size(220.0)
+        .size_range(120.0..=600.0)
+        .show(ui, |ui| {
+            transport(app, ui);
+            ui.add_space(2.0);
+            let shown: Vec<Shown> = app
+                .model
+                .rows()
+                .into_iter()
+                .map(|row| Shown {
+                    times: row.times(),
+                    numbers: match row.values {
+                        Values::Numbers(track) => Some(track.clone()),
+                        Values::Triples(_) => None,
+                    },
+                    path: row.path,
+                    label: row.label,
+                    group: row.group,
+                    range: row.range,
+                })
+                .collect();
+            let selected = app.chosen.selection.track.clone();
+            let curve = shown.iter().find(|s| Some(&s.path) == selected.as_ref() && s.numbers.is_some());
+            let all = ui.available_rect_before_wrap();
+            let curve_height = if curve.is_some() { (0.5 * all.height()).clamp(60.0, 240.0) } else { 0.0 };
+            let ruler_rect = Rect::from_min_size(all.min, vec2(all.width(), RULER));
+            ruler(app, ui, ruler_rect);
+            let list = Rect::from_min_max(
+                pos2(all.left(), ruler_rect.bottom()),
+                all.right_bottom() - vec2(0.0, curve_height),
+            );
+            ui.scope_builder(egui::UiBuilder::new().max_rect(list), |ui| {
+                ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                    ui.spacing_mut().item_spacing.y = 1.0;
+                    if shown.is_empty() {
+                        ui.label(
+                            RichText::new("no tracks yet: move a slider and press K").color(theme::WEAK),
+                        );
+                    }
+                    for row in &shown {
+                        track(app, ui, row);
+                    }
+                });
             });
+            if let Some(row) = curve {
+                let rect = Rect::from_min_max(pos2(all.left(), list.bottom()), all.max);
+                curve_editor(app, ui, rect, row);
+            }
+            ui.advance_cursor_after_rect(all);
         });
-        if let Some(row) = curve {
-            let rect = Rect::from_min_max(pos2(all.left(), list.bottom()), all.max);
-            curve_editor(app, ui, rect, row);
-        }
-        ui.advance_cursor_after_rect(all);
-    });
 }
 
 fn transport(app: &mut App, ui: &mut Ui) {
@@ -100,7 +110,8 @@ fn transport(app: &mut App, ui: &mut Ui) {
         if button(ui, "<", "Frame before (left)").clicked() {
             app.seek_frame(frame - 1);
         }
-        if button(ui, if app.playing.is_some() { "Pause" } else { "Play" }, "Plays in time (space)").clicked() {
+        if button(ui, if app.playing.is_some() { "Pause" } else { "Play" }, "Plays in time (space)").clicked()
+        {
             app.play();
         }
         if button(ui, ">", "Next frame (right)").clicked() {
@@ -146,7 +157,9 @@ fn eases(app: &mut App, ui: &mut Ui, path: &[Step], index: usize) {
     let Some(now) = keys.get(index).map(|k| k.ease) else { return };
     for ease in Ease::ALL {
         let mut on = ease == now;
-        if switch(ui, &mut on, &tracks::ease_name(ease), "How the curve goes on from this key").changed() && on {
+        if switch(ui, &mut on, &tracks::ease_name(ease), "How the curve goes on from this key").changed()
+            && on
+        {
             app.model.edit(|model| model.document.set_ease(path, index, ease));
         }
     }
@@ -165,7 +178,7 @@ fn time_of(app: &App, rect: Rect, x: f32) -> f64 {
 
 fn ruler(app: &mut App, ui: &mut Ui, rect: Rect) {
     let sensed = Rect::from_min_max(pos2(rect.left() + NAMES, rect.top()), rect.max);
-    let response = ui.interact(sensed, Id::new("ruler"), Sense::click_and_drag());
+    let response = ui.interact(sensed, Id::unique("ruler"), Sense::click_and_drag());
     probe::note(ui, "ruler", &response);
     if (response.dragged() || response.clicked())
         && let Some(at) = response.interact_pointer_pos()
@@ -183,7 +196,10 @@ fn ruler(app: &mut App, ui: &mut Ui, rect: Rect) {
     for i in 0..=count {
         let time_s = f64::from(i) * every;
         let x = x_of(app, rect, time_s);
-        painter.line_segment([pos2(x, rect.bottom() - 6.0), pos2(x, rect.bottom())], Stroke::new(1.0, theme::WEAK));
+        painter.line_segment(
+            [pos2(x, rect.bottom() - 6.0), pos2(x, rect.bottom())],
+            Stroke::new(1.0, theme::WEAK),
+        );
         let font = FontId::proportional(10.5);
         painter.text(pos2(x + 3.0, rect.top() + 3.0), Align2::LEFT_TOP, number(time_s, 1), font, theme::WEAK);
     }
@@ -214,11 +230,20 @@ fn track(app: &mut App, ui: &mut Ui, row: &Shown) {
     let text = format!("{}  {}", row.group, row.label);
     let color = if is_selected { Color32::WHITE } else { theme::TEXT };
     let names = painter.with_clip_rect(Rect::from_min_size(rect.min, vec2(NAMES - 6.0, rect.height())));
-    names.text(rect.left_center() + vec2(4.0, 0.0), Align2::LEFT_CENTER, text, FontId::proportional(11.5), color);
+    names.text(
+        rect.left_center() + vec2(4.0, 0.0),
+        Align2::LEFT_CENTER,
+        text,
+        FontId::proportional(11.5),
+        color,
+    );
     let line = pos2(rect.left() + NAMES, rect.center().y);
     painter.line_segment([line, pos2(rect.right() - 12.0, line.y)], Stroke::new(1.0, theme::LINE));
     let x = x_of(app, rect, app.model.time_s);
-    painter.line_segment([pos2(x, rect.top()), pos2(x, rect.bottom())], Stroke::new(1.0, theme::ACCENT.gamma_multiply(0.6)));
+    painter.line_segment(
+        [pos2(x, rect.top()), pos2(x, rect.bottom())],
+        Stroke::new(1.0, theme::ACCENT.gamma_multiply(0.6)),
+    );
     for (i, time_s) in row.times.iter().enumerate() {
         let at = pos2(x_of(app, rect, *time_s), rect.center().y);
         key(app, ui, rect, row, i, at, None);
@@ -229,8 +254,12 @@ fn track(app: &mut App, ui: &mut Ui, row: &Shown) {
 fn key(app: &mut App, ui: &mut Ui, rect: Rect, row: &Shown, index: usize, at: Pos2, curve: Option<Rect>) {
     let place = if curve.is_some() { "curve" } else { "row" };
     let name = written(&row.path);
-    let id = Id::new(("key", place, &name, index));
-    let response = ui.interact(Rect::from_center_size(at, vec2(2.0 * KEY + 2.0, 2.0 * KEY + 4.0)), id, Sense::click_and_drag());
+    let id = Id::unique(("key", place, &name, index));
+    let response = ui.interact(
+        Rect::from_center_size(at, vec2(2.0 * KEY + 2.0, 2.0 * KEY + 4.0)),
+        id,
+        Sense::click_and_drag(),
+    );
     let word = if curve.is_some() { "point" } else { "key" };
     probe::note(ui, &format!("{word} {name} {}", index + 1), &response);
     let selection = Selection { track: Some(row.path.clone()), key: Some(index) };
@@ -257,7 +286,8 @@ fn key(app: &mut App, ui: &mut Ui, rect: Rect, row: &Shown, index: usize, at: Po
     let size = if response.hovered() { KEY + 1.0 } else { KEY };
     let corners = [vec2(0.0, -size), vec2(size, 0.0), vec2(0.0, size), vec2(-size, 0.0)].map(|v| at + v);
     ui.painter().add(Shape::convex_polygon(corners.to_vec(), color, Stroke::new(1.0, theme::BACKDROP)));
-    let value = row.numbers.as_ref().map(|t| number(f64::from(t.at(row.times[index])), 3)).unwrap_or_default();
+    let value =
+        row.numbers.as_ref().map(|t| number(f64::from(t.at(row.times[index])), 3)).unwrap_or_default();
     response.on_hover_text(format!("{name}\n{} s  {value}", number(row.times[index], 4)));
 }
 
@@ -286,7 +316,7 @@ fn curve_editor(app: &mut App, ui: &mut Ui, rect: Rect, row: &Shown) {
         range,
     };
     let plot = Rect::from_min_max(pos2(rect.left() + NAMES, rect.top() + 4.0), rect.max);
-    let response = ui.interact(plot, Id::new("curve"), Sense::click());
+    let response = ui.interact(plot, Id::unique("curve"), Sense::click());
     probe::note(ui, "curve", &response);
     if response.double_clicked()
         && let Some(at) = response.interact_pointer_pos()
@@ -299,7 +329,13 @@ fn curve_editor(app: &mut App, ui: &mut Ui, rect: Rect, row: &Shown) {
         let y = y_of(plot, range, value);
         painter.line_segment([pos2(plot.left(), y), pos2(plot.right(), y)], Stroke::new(1.0, theme::LINE));
         let at = pos2(plot.left() - 6.0, y);
-        painter.text(at, Align2::RIGHT_CENTER, number(f64::from(value), 2), FontId::proportional(10.5), theme::WEAK);
+        painter.text(
+            at,
+            Align2::RIGHT_CENTER,
+            number(f64::from(value), 2),
+            FontId::proportional(10.5),
+            theme::WEAK,
+        );
     }
     painter.text(
         pos2(rect.left() + 4.0, plot.top() + 6.0),
@@ -315,7 +351,10 @@ fn curve_editor(app: &mut App, ui: &mut Ui, rect: Rect, row: &Shown) {
         .collect();
     painter.add(Shape::line(points, Stroke::new(1.5, theme::ACCENT)));
     let x = x_of(app, rect, app.model.time_s);
-    painter.line_segment([pos2(x, plot.top()), pos2(x, plot.bottom())], Stroke::new(1.0, theme::ACCENT.gamma_multiply(0.6)));
+    painter.line_segment(
+        [pos2(x, plot.top()), pos2(x, plot.bottom())],
+        Stroke::new(1.0, theme::ACCENT.gamma_multiply(0.6)),
+    );
     for (i, time_s) in row.times.iter().enumerate() {
         let at = pos2(x_of(app, rect, *time_s), y_of(plot, range, values[i]));
         key(app, ui, rect, &row, i, at, Some(plot));

@@ -3,7 +3,9 @@
 //! A drag sets it, a double click takes a number, the right button lets it go; after a click the arrow keys change it by a
 //! hundredth.
 
-use eframe::egui::{self, Align2, Color32, CursorIcon, EventFilter, FontId, Id, Key, Rect, Sense, StrokeKind, Ui, vec2};
+use eframe::egui::{
+    self, Align2, Color32, CursorIcon, EventFilter, FontId, Id, Key, Rect, Sense, StrokeKind, Ui, vec2,
+};
 
 use crate::view::probe;
 use crate::view::syntax::number;
@@ -47,7 +49,7 @@ pub(crate) fn bar(ui: &mut Ui, bar: &Bar<'_>, width: f32) -> Touched {
     probe::note_range(ui, &bar.name, &response, Some(bar.range));
     let [low, high] = bar.range;
     let mut touched = Touched::default();
-    let entry = Id::new("rubor entry");
+    let entry = Id::unique("rubor entry");
     let entered: Option<(Id, String)> = ui.data(|d| d.get_temp(entry));
     if let Some((id, mut text)) = entered.filter(|(id, _)| *id == response.id) {
         return typed(ui, rect, id, entry, &mut text);
@@ -73,7 +75,8 @@ pub(crate) fn bar(ui: &mut Ui, bar: &Bar<'_>, width: f32) -> Touched {
     if response.has_focus() {
         let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
         ui.memory_mut(|m| m.set_focus_lock_filter(response.id, filter));
-        let steps = ui.input(|i| i.num_presses(Key::ArrowRight) as f32 - i.num_presses(Key::ArrowLeft) as f32);
+        let steps =
+            ui.input(|i| i.num_presses(Key::ArrowRight) as f32 - i.num_presses(Key::ArrowLeft) as f32);
         if steps != 0.0 {
             touched.value = Some((bar.value + steps * STEP * (high - low)).clamp(low, high));
             touched.is_done = true;
@@ -103,7 +106,8 @@ fn paint(ui: &Ui, rect: Rect, bar: &Bar<'_>, response: &egui::Response) {
     let font = FontId::proportional(12.0);
     let value = number(f64::from(bar.value), 2);
     let shown = if bar.value == 0.0 { theme::WEAK } else { Color32::WHITE };
-    let right = painter.text(rect.right_center() - vec2(5.0, 0.0), Align2::RIGHT_CENTER, value, font.clone(), shown);
+    let right =
+        painter.text(rect.right_center() - vec2(5.0, 0.0), Align2::RIGHT_CENTER, value, font.clone(), shown);
     let clip = Rect::from_min_max(rect.min, egui::pos2(right.left() - 3.0, rect.bottom()));
     let name = painter.with_clip_rect(clip);
     name.text(rect.left_center() + vec2(7.0, 0.0), Align2::LEFT_CENTER, bar.label, font, theme::TEXT);
