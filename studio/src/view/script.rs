@@ -36,7 +36,7 @@ use crate::error::{Failure, Outcome};
 use crate::output;
 
 /// A step fails when it has waited this long.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(600);
 
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
