@@ -244,6 +244,8 @@ impl App {
         };
         if app.script.is_some() {
             probe::start(ctx);
+            // Clicks of a script may take as long as a slow frame.
+            ctx.options_mut(|options| options.input_options.max_click_duration = 60.0);
         }
         if let Some(address) = start.live {
             app.chosen.live_address = address.to_string();

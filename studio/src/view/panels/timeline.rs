@@ -38,6 +38,8 @@ struct Shown {
 
 /// Width of the names, points.
 const NAMES: f32 = 150.0;
+/// Room after the end of the sequence, for its number.
+const END: f32 = 26.0;
 /// Height of the ruler.
 const RULER: f32 = 22.0;
 /// Reach of a key.
@@ -168,12 +170,12 @@ fn eases(app: &mut App, ui: &mut Ui, path: &[Step], index: usize) {
 /// Horizontal place of a time.
 fn x_of(app: &App, rect: Rect, time_s: f64) -> f32 {
     let left = rect.left() + NAMES;
-    left + (time_s / app.model.duration_s()) as f32 * (rect.right() - 12.0 - left)
+    left + (time_s / app.model.duration_s()) as f32 * (rect.right() - END - left)
 }
 
 fn time_of(app: &App, rect: Rect, x: f32) -> f64 {
     let left = rect.left() + NAMES;
-    f64::from((x - left) / (rect.right() - 12.0 - left)) * app.model.duration_s()
+    f64::from((x - left) / (rect.right() - END - left)) * app.model.duration_s()
 }
 
 fn ruler(app: &mut App, ui: &mut Ui, rect: Rect) {
@@ -238,7 +240,7 @@ fn track(app: &mut App, ui: &mut Ui, row: &Shown) {
         color,
     );
     let line = pos2(rect.left() + NAMES, rect.center().y);
-    painter.line_segment([line, pos2(rect.right() - 12.0, line.y)], Stroke::new(1.0, theme::LINE));
+    painter.line_segment([line, pos2(rect.right() - END, line.y)], Stroke::new(1.0, theme::LINE));
     let x = x_of(app, rect, app.model.time_s);
     painter.line_segment(
         [pos2(x, rect.top()), pos2(x, rect.bottom())],
