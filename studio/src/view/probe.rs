@@ -60,7 +60,7 @@ pub(crate) fn note_range(ui: &Ui, name: &str, response: &Response, range: Option
         if !probe.is_on {
             return false;
         }
-        if ui.clip_rect().intersects(response.rect) {
+        if ui.clip_rect().contains(response.rect.center()) {
             probe.found.insert(name.to_owned(), Found { rect: response.rect, range });
         }
         probe.wanted.as_deref() == Some(name)

@@ -75,6 +75,8 @@ pub struct Script {
     since: Instant,
     frames: u32,
     wanted: Option<String>,
+    /// Where the wanted widget was in the last frame: it may still be scrolled.
+    last: Option<egui::Rect>,
     screenshot: Arc<Mutex<Option<Arc<egui::ColorImage>>>>,
     asked: bool,
     measured: Option<Measured>,
@@ -109,6 +111,7 @@ impl Script {
             since: Instant::now(),
             frames: 0,
             wanted: None,
+            last: None,
             screenshot: Arc::default(),
             asked: false,
             measured: None,
@@ -265,8 +268,12 @@ impl Script {
         if self.frames < 3 {
             return Ok(None);
         }
-        match probe::find(ctx, name) {
-            Some(found) => Ok(Some(found)),
+        let found = probe::find(ctx, name);
+        let stands = found.is_some_and(|found| self.last == Some(found.rect));
+        self.last = found.map(|found| found.rect);
+        match found {
+            Some(found) if stands => Ok(Some(found)),
+            Some(_) => Ok(None),
             None if self.frames < FRAMES => Ok(None),
             None => {
                 let near =
