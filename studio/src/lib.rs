@@ -62,6 +62,8 @@ pub mod run;
 pub mod stop;
 pub mod studio;
 pub mod utilisation;
+#[cfg(feature = "view")]
+pub mod view;
 pub mod walks;
 pub mod watch;
 mod writers;

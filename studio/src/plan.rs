@@ -29,7 +29,7 @@ use crate::utilisation::{Clock, Work};
 /// Share of the width of a head that is left free between two heads.
 const SPACING: f32 = 1.05;
 /// Frames before a frame that its pixels depend on, with antialiasing over time.
-const REMEMBERED_FRAMES: u32 = 2;
+pub(crate) const REMEMBERED_FRAMES: u32 = 2;
 
 /// Frames whose shots are evaluated before the device has room for them.
 const FRAMES_AHEAD: usize = 2;

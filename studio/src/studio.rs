@@ -13,11 +13,11 @@ use std::sync::Arc;
 use glam::{Mat4, Vec3};
 use image::RgbImage;
 use rubor_assets::convert::levels;
-use rubor_renderer::channels::ChannelData;
+use rubor_renderer::channels::{Channel, ChannelData};
 use rubor_renderer::settings::{RasterMethod, Settings};
 use rubor_renderer::{
     AdapterDescription, Camera, ColorTable, Environment, FrameStats, FrameTimes, Gpu, HeadInstance,
-    HeadOnGpu, Image, Ladder, Light, LightKind, Optics, Renderer, Scene, native,
+    HeadOnGpu, Image, Ladder, Light, LightKind, Optics, PendingTimes, Renderer, Scene, native,
 };
 use rubor_rig::authored::Authored;
 use rubor_rig::evaluate::{LightState, Shot};
@@ -111,7 +111,15 @@ impl Studio {
     /// # Errors
     /// As [`open_device`].
     pub fn open(adapter: Option<&str>) -> Outcome<Self> {
-        let renderer = Renderer::new(open_device(adapter)?)?;
+        Self::on(open_device(adapter)?)
+    }
+
+    /// A studio on a device that is open.
+    ///
+    /// # Errors
+    /// The device refuses a shader.
+    pub fn on(gpu: Gpu) -> Outcome<Self> {
+        let renderer = Renderer::new(gpu)?;
         let skin = SkinModel::new(&ChromophoreModel::default()).bake(COLOR_TABLE_SIDE, COLOR_TABLE_SIDE);
         Ok(Self {
             renderer,
@@ -137,6 +145,11 @@ impl Studio {
             backend: format!("{:?}", info.backend),
             driver: info.driver_info.clone(),
         }
+    }
+
+    /// The open device.
+    pub fn gpu(&self) -> &Gpu {
+        self.renderer.gpu()
     }
 
     /// Whether the device is a processor and not a graphics card.
@@ -246,6 +259,37 @@ impl Studio {
         Ok(Arrived(arrived))
     }
 
+    /// Submits a frame into a texture of the caller (see [`Renderer::record`]) and waits for nothing. The times of its passes
+    /// can be read when the device is done.
+    ///
+    /// # Errors
+    /// As [`Studio::draw`]; a method that does not draw a frame in one go; a texture that does not fit.
+    pub fn draw_into(
+        &mut self,
+        shots: &[Shot],
+        spacing_m: f32,
+        settings: &Settings,
+        into: &wgpu::Texture,
+    ) -> Outcome<PendingTimes> {
+        self.choose_raster(shots, spacing_m, settings)?;
+        let gpu = self.renderer.gpu().clone();
+        self.with_scene(shots, spacing_m, |renderer, scene| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let times = renderer.record(&mut encoder, scene, settings, into)?;
+            gpu.queue.submit([encoder.finish()]);
+            gpu.check()?;
+            Ok(times)
+        })
+    }
+
+    /// A channel of the last frame, which its settings have to name. Waits for the device.
+    ///
+    /// # Errors
+    /// The device failed.
+    pub fn read(&self, channel: Channel) -> Outcome<ChannelData> {
+        Ok(native::wait(self.renderer.gpu(), self.renderer.read(channel))?)
+    }
+
     /// Draws shots of heads side by side again and again, one frame right after the other, and returns the cost of each;
     /// the first `warm_up` frames are left out.
     ///
@@ -325,6 +369,11 @@ impl Studio {
             optics: optics(first),
         };
         draw(&mut self.renderer, &scene)
+    }
+
+    /// Forgets the last environment: its image may have changed.
+    pub fn forget_surroundings(&mut self) {
+        self.surroundings = None;
     }
 
     /// Loads an environment onto the device, unless it is there.

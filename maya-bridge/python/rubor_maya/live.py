@@ -1,7 +1,4 @@
-"""Sends the weights of a head to a viewer on this machine while the artist works.
-
-`rubor view`, which will listen, is not part of rubor yet; until then any program that reads these lines can.
-"""
+"""Sends the weights of a head to a viewer on this machine while the artist works: `rubor view HEAD --live`."""
 
 import socket
 

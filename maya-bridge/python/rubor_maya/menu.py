@@ -62,10 +62,8 @@ def start_live(host):
     try:
         link = live.LiveLink(host, path)
     except OSError as error:
-        # `rubor view` comes later: until then only another program that speaks messages.py can listen.
         raise ValueError(
-            "no viewer answers ({}): `rubor view` is not part of rubor yet; "
-            "any program that reads the lines of messages.py can listen".format(error)
+            "no viewer answers ({}): start one with `rubor view HEAD --live`".format(error)
         ) from error
     _state["link"] = link
     link.start()

@@ -1,5 +1,6 @@
 //! The device: opens an adapter or takes over an open device; makes buffers and textures.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use bytemuck::Pod;
@@ -22,6 +23,7 @@ pub struct Gpu {
     /// value of a uniform that a loop or a branch depends on, and never frees the code.
     pub(crate) stores_uniforms: bool,
     failure: Arc<Mutex<Option<String>>>,
+    is_lost: Arc<AtomicBool>,
     /// The submission that produces the next result.
     wanted: Arc<Mutex<Option<wgpu::SubmissionIndex>>>,
 }
@@ -51,15 +53,19 @@ fn instance() -> wgpu::Instance {
 
 async fn adapters() -> Vec<wgpu::Adapter> {
     let mut found = instance().enumerate_adapters(wgpu::Backends::all()).await;
-    // Real GPUs first; the order among equals is the driver's.
-    found.sort_by_key(|a| match a.get_info().device_type {
+    found.sort_by_key(rank);
+    found
+}
+
+/// Real GPUs first; the order among equals is the driver's.
+fn rank(adapter: &wgpu::Adapter) -> u8 {
+    match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
         wgpu::DeviceType::VirtualGpu => 2,
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
-    });
-    found
+    }
 }
 
 fn describe(index: usize, adapter: &wgpu::Adapter) -> AdapterDescription {
@@ -80,6 +86,20 @@ pub(crate) async fn list_adapters() -> Vec<AdapterDescription> {
     adapters().await.iter().enumerate().map(|(i, a)| describe(i, a)).collect()
 }
 
+/// The adapter whose place in the list or part of whose name (any letter case) is `wanted`, or the first.
+fn choose(adapters: &[wgpu::Adapter], wanted: Option<&str>) -> Result<usize, RenderError> {
+    let Some(wanted) = wanted else { return Ok(0) };
+    let by_name = || {
+        let lower = wanted.to_lowercase();
+        adapters.iter().position(|a| a.get_info().name.to_lowercase().contains(&lower))
+    };
+    let by_place = wanted.parse::<usize>().ok().filter(|i| *i < adapters.len());
+    by_place.or_else(by_name).ok_or_else(|| RenderError::UnknownAdapter {
+        wanted: wanted.to_owned(),
+        found: adapters.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.get_info().name)).collect(),
+    })
+}
+
 /// Optional features, used where the adapter has them.
 const WELCOME_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::PRIMITIVE_INDEX)
@@ -88,6 +108,20 @@ const WELCOME_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SHADER_INT64_ATOMIC_MIN_MAX);
 
 impl Gpu {
+    /// Of the adapters that another program found, the best one, or that whose place among them, best first, or part of whose
+    /// name (any letter case) is `wanted`.
+    ///
+    /// # Errors
+    /// No adapter exists, or none has that name.
+    pub fn choose(adapters: &[wgpu::Adapter], wanted: Option<&str>) -> Result<wgpu::Adapter, RenderError> {
+        let mut sorted = adapters.to_vec();
+        sorted.sort_by_key(rank);
+        if sorted.is_empty() {
+            return Err(RenderError::NoAdapter);
+        }
+        Ok(sorted.swap_remove(choose(&sorted, wanted)?))
+    }
+
     /// Whether the device is a processor and not a graphics card.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
@@ -102,31 +136,28 @@ impl Gpu {
         if all.is_empty() {
             return Err(RenderError::NoAdapter);
         }
-        let chosen = match wanted {
-            None => Some(0),
-            Some(w) => w.parse::<usize>().ok().filter(|i| *i < all.len()).or_else(|| {
-                let w = w.to_lowercase();
-                all.iter().position(|a| a.get_info().name.to_lowercase().contains(&w))
-            }),
-        };
-        let Some(adapter) = chosen.map(|i| &all[i]) else {
-            return Err(RenderError::UnknownAdapter {
-                wanted: wanted.unwrap_or_default().to_owned(),
-                found: all.iter().enumerate().map(|(i, a)| format!("{i}: {}", a.get_info().name)).collect(),
-            });
-        };
-        Self::open(adapter).await
+        Self::open(&all[choose(&all, wanted)?]).await
     }
 
     async fn open(adapter: &wgpu::Adapter) -> Result<Self, RenderError> {
         let info = adapter.get_info();
+        let (device, queue) = adapter
+            .request_device(&Self::descriptor(adapter))
+            .await
+            .map_err(|e| RenderError::Device { adapter: info.name.clone(), reason: e.to_string() })?;
+        Ok(Self::from_device(device, queue, info))
+    }
+
+    /// What a device has to be asked for, so that it draws as one that [`Gpu::new`] opens: for programs that open devices
+    /// themselves and hand them over by [`Gpu::from_device`].
+    pub fn descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let most = adapter.limits();
         // WebGPU's defaults, but images and buffers as large as the adapter can hold.
         let required_limits = wgpu::Limits {
             max_texture_dimension_2d: most.max_texture_dimension_2d,
             max_buffer_size: most.max_buffer_size,
             max_storage_buffer_binding_size: most.max_storage_buffer_binding_size,
-            max_storage_buffers_per_shader_stage: if info.device_type == wgpu::DeviceType::Cpu {
+            max_storage_buffers_per_shader_stage: if adapter.get_info().device_type == wgpu::DeviceType::Cpu {
                 // The limit includes uniforms on this device.
                 most.max_storage_buffers_per_shader_stage
             } else {
@@ -134,17 +165,12 @@ impl Gpu {
             },
             ..wgpu::Limits::default()
         };
-        let descriptor = wgpu::DeviceDescriptor {
+        wgpu::DeviceDescriptor {
             label: Some("rubor"),
             required_features: adapter.features() & WELCOME_FEATURES,
             required_limits,
             ..Default::default()
-        };
-        let (device, queue) = adapter
-            .request_device(&descriptor)
-            .await
-            .map_err(|e| RenderError::Device { adapter: info.name.clone(), reason: e.to_string() })?;
-        Ok(Self::from_device(device, queue, info))
+        }
     }
 
     /// Takes a device that another program opened, within WebGPU's default limits. Passes are timed if it has timestamp
@@ -158,7 +184,10 @@ impl Gpu {
             }
         }));
         let seen = failure.clone();
+        let is_lost = Arc::new(AtomicBool::new(false));
+        let lost = is_lost.clone();
         device.set_device_lost_callback(move |reason, message| {
+            lost.store(true, Ordering::Relaxed);
             if let Ok(mut slot) = seen.lock() {
                 slot.get_or_insert_with(|| format!("the device is lost ({reason:?}) {message}"));
             }
@@ -167,7 +196,16 @@ impl Gpu {
         // Each shader has at most eight other buffers.
         let stores_uniforms = info.device_type == wgpu::DeviceType::Cpu
             && device.limits().max_storage_buffers_per_shader_stage >= 12;
-        Self { device, queue, info, has_timestamps, stores_uniforms, failure, wanted: Arc::default() }
+        Self {
+            device,
+            queue,
+            info,
+            has_timestamps,
+            stores_uniforms,
+            failure,
+            is_lost,
+            wanted: Arc::default(),
+        }
     }
 
     /// The first error that the device reported since the last call.
@@ -179,6 +217,11 @@ impl Gpu {
             Some(message) => Err(RenderError::Lost(message)),
             None => Ok(()),
         }
+    }
+
+    /// Whether the device is gone for good.
+    pub fn is_lost(&self) -> bool {
+        self.is_lost.load(Ordering::Relaxed)
     }
 
     /// Sets the submission that produces the next result, so that a wait for the result does not wait for later

@@ -477,6 +477,14 @@ fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 4]) {
     (order.iter().map(triangle).collect(), counts)
 }
 
+/// The triangle of `head.mesh` that each number of [`crate::channels::Channel::Ids`] stands for, in frames that draw the whole
+/// head (`--detail full`); the numbers in ids are one larger.
+pub fn triangles_of_ids(head: &Head) -> Vec<u32> {
+    let (mut order, [opaque, ..]) = triangle_order(head);
+    order.truncate(opaque as usize);
+    order
+}
+
 /// Triangles of a head in the order of the device's list: opaque ones first, the last of them those with holes,
 /// of these the last ones those that are seen through; then overlays; hidden ones are left out. How many are opaque, have
 /// holes, are seen through, and are overlays.

@@ -20,7 +20,7 @@ pub(crate) mod view;
 pub use environment::{Environment, EnvironmentMap};
 pub use head::{
     ColorTable, HeadOnGpu, Ladder, MAX_DISTRIBUTIONS, MAX_HEMOGLOBIN, MAX_MELANIN, MAX_WRINKLE_MAPS,
-    MAX_ZONES,
+    MAX_ZONES, triangles_of_ids,
 };
 pub use optics::Optics;
 pub(crate) use posed_head::PosedHead;

@@ -37,6 +37,8 @@ mod scan_maps;
 mod schema;
 mod settings_flags;
 mod signals;
+#[cfg(feature = "view")]
+mod view;
 
 /// Faces whose skin changes colour and wrinkles as they act.
 ///
@@ -58,6 +60,9 @@ enum Command {
     Demo(demo::Arguments),
     /// Render a sequence to frames, a review page, a contact sheet, a video and an animated head
     Render(render::Arguments),
+    /// Open a window: pose, key and look at a face live, while its files are edited and weights arrive
+    #[cfg(feature = "view")]
+    View(view::Arguments),
     /// Draw a page of views, expressions, lights and characters
     Gallery(gallery::Arguments),
     /// Make a head from other files
@@ -108,6 +113,8 @@ pub(crate) fn run() -> ExitCode {
     let outcome = match arguments.command {
         Command::Demo(a) => demo::run(&a),
         Command::Render(a) => render::run(&a),
+        #[cfg(feature = "view")]
+        Command::View(a) => view::run(&a),
         Command::Gallery(a) => gallery::run(&a),
         Command::Import(a) => import::run(&a),
         Command::Export(a) => export::run(&a),
