@@ -697,7 +697,7 @@ fn a_frame_goes_into_commands_and_a_texture_of_somebody_else() {
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let wrong = texture(wgpu::TextureFormat::Rgba16Float, wgpu::TextureUsages::STORAGE_BINDING);
     let message =
-        renderer.record(&mut encoder, &scene, &settings([51, 27]), &wrong).expect_err("it is refused");
+        renderer.record(&mut encoder, &scene, &settings([51, 27]), &wrong).err().expect("it is refused");
     assert!(message.to_string().contains("Rgba8Unorm"), "{message}");
     let mut reference = settings([51, 27]);
     reference.quality.scatter = ScatterMethod::ReferenceSurface(1);

@@ -83,6 +83,7 @@ fn head() -> Head {
     Head {
         name: "dome".into(),
         mesh: Mesh {
+            occlusion: vec![1.0; points.len()],
             points,
             vertices,
             triangles,

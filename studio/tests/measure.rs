@@ -285,10 +285,11 @@ fn methods_stand_beside_the_volume_and_stills_go_to_other_programs() {
         report["choices"].as_array().expect("choices").iter().map(|c| &c["name"]).collect();
     assert_eq!(names, ["reference-screen", "none", "separable:9", "reference-surface:1"]);
     let error = |c: usize| report["choices"][c]["relativeRmse"].as_f64().unwrap_or(f64::NAN);
-    assert!([1, 2].into_iter().all(|c| error(c) > 0.0 && error(c) < 1.0), "{} {}", error(1), error(2));
-    // Methods miss most of the light that comes through the ear.
+    // What the noise of so few paths explains is left out of errors, and may be all of them.
+    assert!([1, 2].into_iter().all(|c| error(c) >= 0.0 && error(c) < 1.0), "{} {}", error(1), error(2));
+    // Light that comes through the ear is there; that of the profile would be -0.7.
     let thin = report["choices"][2]["bias"]["thin"].as_f64().unwrap_or(f64::NAN);
-    assert!((-1.0..-0.3).contains(&thin), "{thin}");
+    assert!((-0.4..0.8).contains(&thin), "{thin}");
     let noise = report["stills"][0]["noise"].as_f64().unwrap_or(f64::NAN);
     assert!(noise > 0.0 && noise < 1.0, "{noise}");
     for file in

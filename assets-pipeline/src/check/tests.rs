@@ -17,6 +17,7 @@ fn good() -> Head {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let mesh = Mesh {
         points: corners.map(|[x, y]| 0.25 * Vec3::new(x, y, 0.0)).to_vec(),
+        occlusion: vec![1.0; 4],
         vertices: (0..4)
             .map(|i| Vertex { point: i, uv: Vec2::from_array(corners[i as usize]) * 0.4 })
             .collect(),

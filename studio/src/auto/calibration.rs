@@ -185,6 +185,8 @@ pub struct Calibration {
     base_ms: [f64; 2],
     /// Settings that are chosen.
     pub groups: Vec<Group>,
+    /// Least and largest value of each term in the shots: beyond them a fit says nothing, so they are used in their place.
+    range: [[f64; 2]; TERMS],
     /// How their mean FLIP adds up.
     flip: Together,
     /// How their relative RMSE adds up.
@@ -195,6 +197,17 @@ fn terms(f: &Features) -> [f64; TERMS] {
     let s = f.mm_per_pixel.max(1e-4).ln();
     let [relief, brightness] = [f.relief.max(1e-3).ln(), f.brightness.max(1e-2).ln()];
     [1.0, s, s * s, f.share.max(1e-6).ln(), f.backlight, f.contrast, relief, brightness]
+}
+
+/// Least and largest value of each term.
+fn range_of(features: &[Features]) -> [[f64; 2]; TERMS] {
+    let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; TERMS];
+    for f in features.iter().filter(|f| f.share > 0.0) {
+        for (range, term) in range.iter_mut().zip(terms(f)) {
+            *range = [range[0].min(term), range[1].max(term)];
+        }
+    }
+    range
 }
 
 fn megapixels(f: &Features, size: [u32; 2]) -> f64 {
@@ -290,6 +303,7 @@ impl Calibration {
             shots: features.len(),
             base_ms: [0.0; 2],
             groups,
+            range: range_of(features),
             flip: Together { share: 1.0, factor: 1.0 },
             relative_rmse: Together { share: 1.0, factor: 1.0 },
         };
@@ -347,7 +361,11 @@ impl Calibration {
         };
         match estimate {
             Some(e) if f.share > 0.0 => {
-                let mean = (group.drive.of(f) * dot(&e.coefficients, &terms(f)).exp()).min(1.0);
+                let seen = terms(f);
+                let known: [f64; TERMS] = std::array::from_fn(|i| {
+                    seen[i].clamp(self.range[i][0], self.range[i][1].max(self.range[i][0]))
+                });
+                let mean = (group.drive.of(f) * dot(&e.coefficients, &known).exp()).min(1.0);
                 Expected { mean, margin: (mean * e.margin.exp_m1()).min(1.0) }
             }
             _ => Expected::default(),

@@ -33,7 +33,7 @@ use crate::error::{Failure, Outcome};
 use crate::measure::file_name;
 use crate::output;
 
-/// The measurements that ship with rubor: made by `rubor chart --calibrate` (docs/auto.md says where and when).
+/// The measurements that ship with rubor: made by `rubor chart --calibrate` (docs/speed.md says where and when).
 const SHIPPED: &str = include_str!("h200.json");
 
 /// A choice stays while it keeps the bound, unless a cheaper one keeps this share of it.
@@ -414,6 +414,7 @@ mod tests {
         let size = [1280, 720];
         let mut before: Option<Chosen> = None;
         let (mut changes, mut free) = (0, 0);
+        let mut left: Vec<(i32, Vec<Option<usize>>)> = Vec::new();
         let mut last_free: Option<Chosen> = None;
         for i in 0..400 {
             // A slow zoom with a tremble.
@@ -421,12 +422,18 @@ mod tests {
             let f = Features { mm_per_pixel: 0.1 * 1.01f64.powi(i) * tremble, ..NEAR };
             let chosen = auto.choose(&[f], size, before.as_ref());
             let alone = auto.choose(&[f], size, None);
-            changes += usize::from(before.as_ref().is_some_and(|b| b.choices != chosen.choices));
+            if let Some(before) = before.as_ref().filter(|b| b.choices != chosen.choices) {
+                changes += 1;
+                // What was left is not taken again soon.
+                let back = left.iter().find(|(at, choices)| i - at < 24 && *choices == chosen.choices);
+                assert!(back.is_none(), "{back:?} again in frame {i}");
+                left.push((i, before.choices.clone()));
+            }
             free += usize::from(last_free.as_ref().is_some_and(|b| b.choices != alone.choices));
             assert!(chosen.is_kept || !alone.is_kept, "the bound comes first");
             (before, last_free) = (Some(chosen), Some(alone));
         }
-        assert!(changes <= 12 && changes < free, "{changes} changes, {free} without memory");
+        assert!(3 * changes < free, "{changes} changes, {free} without memory");
     }
 
     #[test]

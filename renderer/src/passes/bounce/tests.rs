@@ -63,6 +63,7 @@ fn lower_square(bounce: BounceMethod, visibility: f32) -> Option<Vec<[f32; 4]>> 
         environment_rotation: 0.0,
         environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let settings = Settings {
         output: Output { size: [9; 2], channels: vec![Channel::Diffuse], ..Output::default() },

@@ -451,6 +451,7 @@ fn tiles_that_are_listed_get_the_light_of_whole_windows() {
         environment_rotation: 0.3,
         environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
+        optics: Default::default(),
     };
     let mut settings = settings([107, 83]);
     settings.quality.antialias = crate::settings::AntialiasMethod::SmaaS2x;

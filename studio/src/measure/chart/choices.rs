@@ -5,8 +5,8 @@
 //! ```
 
 use rubor_renderer::settings::{
-    AntialiasMethod, ColorMethod, DetailMethod, Leaf, RasterMethod, ScatterMethod, Settings, TransmitMethod,
-    WrinkleMethod,
+    AntialiasMethod, BounceMethod, ColorMethod, DetailMethod, Leaf, RasterMethod, ScatterMethod, Settings,
+    TransmitMethod, WrinkleMethod,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -79,6 +79,7 @@ const METHODS: &[(&str, &[&str], &[&str])] = &[
     ("wrinkles", &["none", "difference", "partial-derivative"], &[]),
     ("color", &["static", "hemoglobin"], &[]),
     ("antialias", &["none", "mlaa", "smaa-1x", "smaa-s2x"], &["smaa-t2x", "smaa-4x", "ssaa:2", "ssaa:4"]),
+    ("bounce", &["none", "patches"], &[]),
     ("detail", &["auto", "full"], &[]),
     ("raster", &[], &["hardware", "compute"]),
 ];
@@ -99,6 +100,7 @@ fn truth(flag: &str, base: &Settings, effort: Effort) -> Option<(Measure, Settin
         ("wrinkles", _) => quality.wrinkles = WrinkleMethod::PartialDerivative,
         ("color", _) => quality.color = ColorMethod::Hemoglobin,
         ("antialias", _) => quality.antialias = AntialiasMethod::Ssaa(effort.samples),
+        ("bounce", _) => quality.bounce = BounceMethod::Patches,
         ("detail", _) => quality.detail = DetailMethod::Full,
         ("raster", _) => quality.raster = RasterMethod::Hardware,
         _ => return None,

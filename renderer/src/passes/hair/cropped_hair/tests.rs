@@ -238,6 +238,7 @@ fn both_ways(
             environment_rotation: 0.0,
             environment_intensity: 0.0,
             background_linear: Vec3::splat(0.02),
+            optics: Default::default(),
         };
         let mut settings = settings([size; 2]);
         settings.quality.raster = raster;
