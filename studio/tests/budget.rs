@@ -91,7 +91,6 @@ fn head() -> Head {
                 Part { name: "dome".into(), material: Material::Skin, triangles: 0..skin },
                 Part { name: "bead".into(), material: Material::Teeth, triangles: skin..skin + 1 },
             ],
-            ..Mesh::default()
         },
         shapes: vec![
             shape("mouthSmileLeft", [0.65, 0.7], [0.012, 0.012, 0.01]),
