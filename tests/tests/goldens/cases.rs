@@ -330,7 +330,7 @@ fn lens() -> Vec<Case> {
         open("focus-on-the-ear", "lens-ear", "gather:48"),
         look("bloom", r#"{ "bloom": 0.3, "bloomRadius": 0.3 }"#),
         look("grain", r#"{ "grain": 60, "grainSize": 20 }"#),
-        look("coarse-grain", r#"{ "grain": 60, "grainSize": 900 }"#),
+        look("coarse-grain", r#"{ "grain": 60, "grainSize": 200 }"#),
         case("lens-fade", "bust", Methods { look: r#"{ "fade": 90 }"#, ..USUAL }),
         Case {
             // Nothing of the noise may stay in the history.
