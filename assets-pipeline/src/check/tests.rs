@@ -23,7 +23,6 @@ fn good() -> Head {
             .collect(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         parts: vec![Part { name: "skin".into(), material: Material::Skin, triangles: 0..2 }],
-        ..Mesh::default()
     };
     let shape = BlendShape {
         name: "jawOpen".into(),
