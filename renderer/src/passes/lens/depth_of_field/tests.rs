@@ -136,7 +136,8 @@ fn blur_is_that_of_every_pixel_of_every_disk() {
     let smooth =
         |x: f64, y: f64, k: f64| 0.6 + 0.25 * (0.21 * x + k).sin() + 0.25 * (0.17 * y - 2.0 * k).cos();
     let far_radius = 24.0f32;
-    let scenes: [(&str, Box<dyn Fn(usize, usize) -> Option<f32>>); 4] = [
+    type DepthAt = Box<dyn Fn(usize, usize) -> Option<f32>>;
+    let scenes: [(&str, DepthAt); 4] = [
         ("slope", Box::new(|x, _| Some(x as f32 * 0.08 - 3.0))),
         ("blurred edge before a sharp wall", Box::new(|x, _| Some(if x < 48 { -5.0 } else { 0.0 }))),
         ("sharp edge before a blurred wall", Box::new(|x, _| Some(if x < 48 { 0.0 } else { 6.0 }))),
