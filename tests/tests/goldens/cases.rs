@@ -119,6 +119,8 @@ impl Methods {
         Some(match group {
             "scatter" => self.scatter,
             "transmit" => self.transmit,
+            // The default, in all of them.
+            "bounce" => "patches",
             "curvature" => self.curvature,
             "color" => self.color,
             "wrinkles" => self.wrinkles,
