@@ -37,7 +37,7 @@ lint:
 	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
 
 unit:
-	$(CARGO) test --workspace --locked
+	$(CARGO) test --workspace --locked --no-fail-fast
 	@if command -v python3 >/dev/null; then python3 -m unittest discover -q -s maya-bridge/python/tests; \
 	else echo "SKIPPED: the tests of the Maya module need python3"; fi
 

@@ -30,11 +30,15 @@ pub enum Channel {
     Diffuse,
     /// Diffuse light before scattering, of a white surface.
     Irradiance,
+    /// The part of `irradiance` that came through thin parts, by `shadow-depth`; 0 with methods that do not tell it.
+    Transmitted,
     /// Albedo of skin less what its surface reflects at this angle, 0 elsewhere; the fourth component is the strength
     /// of scattering.
     Albedo,
     /// Specular light, and all light of what does not scatter.
     Direct,
+    /// Hairs, lashes, brows and the wet film of the eye, which lie over the rest: radiance times coverage, and coverage.
+    Hair,
     /// Reversed infinite depth: near plane over distance, 0 for the background.
     Depth,
     /// Head in the upper 5 bits, triangle plus one in the lower 27; 0 for the background.
@@ -79,8 +83,10 @@ pub const CHANNELS: &[ChannelRow] = &[
     row(Channel::Radiance, Extent::Pixels, RGB_A, "radiance", "linear Rec. 709"),
     row(Channel::Diffuse, Extent::Pixels, RGB_A, "radiance", "linear Rec. 709"),
     row(Channel::Irradiance, Extent::Pixels, RGB_A, "radiance", "linear Rec. 709"),
+    row(Channel::Transmitted, Extent::Pixels, RGB_A, "radiance", "linear Rec. 709"),
     row(Channel::Albedo, Extent::Pixels, RGB_A, "share", "linear Rec. 709"),
     row(Channel::Direct, Extent::Pixels, RGB_A, "radiance", "linear Rec. 709"),
+    row(Channel::Hair, Extent::Pixels, RGB_A, "radiance", "linear Rec. 709"),
     row(Channel::Depth, Extent::Pixels, &["Z"], "near plane / distance", "view"),
     row(Channel::Ids, Extent::Pixels, &["id"], "bits", "none"),
     row(Channel::Velocity, Extent::Pixels, &["X", "Y"], "pixels", "picture"),

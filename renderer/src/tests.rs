@@ -44,6 +44,7 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
     for entry in ["shade_authored", "shade_layer"] {
         assert_workgroups(&shade::authored_program(), &square(entry));
     }
+    assert_workgroups(&shade::through_program(), &square("through"));
     assert_workgroups(&bounce::emit_program(), &line("emit"));
     for again in [false, true] {
         for entry in ["average", "gather"] {

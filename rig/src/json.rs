@@ -247,20 +247,22 @@ pub fn read_text(path: &std::path::Path) -> Result<String, RigError> {
     })
 }
 
+/// What a file may say beyond JSON: comments, and a comma after the last value.
+pub const SYNTAX: ParseOptions = ParseOptions {
+    allow_comments: true,
+    allow_trailing_commas: true,
+    allow_loose_object_property_names: false,
+    allow_missing_commas: false,
+    allow_single_quoted_strings: false,
+    allow_hexadecimal_numbers: false,
+    allow_unary_plus_numbers: false,
+    allow_bare_decimal_point_numbers: false,
+    allow_non_finite_numbers: false,
+    allow_extended_string_escapes: false,
+};
+
 fn parse(text: &str) -> Result<Option<Value<'_>>, jsonc_parser::errors::ParseError> {
-    let options = ParseOptions {
-        allow_comments: true,
-        allow_trailing_commas: true,
-        allow_loose_object_property_names: false,
-        allow_missing_commas: false,
-        allow_single_quoted_strings: false,
-        allow_hexadecimal_numbers: false,
-        allow_unary_plus_numbers: false,
-        allow_bare_decimal_point_numbers: false,
-        allow_non_finite_numbers: false,
-        allow_extended_string_escapes: false,
-    };
-    Ok(parse_to_ast(text, &CollectOptions::default(), &options)?.value)
+    Ok(parse_to_ast(text, &CollectOptions::default(), &SYNTAX)?.value)
 }
 
 fn place_of_offset(file: &str, text: &str, offset: usize) -> Place {

@@ -8,8 +8,8 @@
 //! layer name. Light is linear Rec. 709 before exposure and tone map, in halves; depth, motion and chromophores are floats,
 //! ids whole numbers. Rows are compressed by 16 (ZIP), without loss.
 //!
-//! Beauty is `diffuse * albedo + specular`, and hair, lashes and what is seen through on top; `irradiance` is `diffuse`
-//! before it scatters.
+//! Beauty is `(diffuse * albedo + specular) * (1 - hair.A) + hair`, with what is seen through on top; `irradiance` is `diffuse`
+//! before it scatters, and `transmittance` the part of that which came through thin parts.
 //!
 //! Where a pixel has several samples, light and masks are means over the pixel, and data that have no mean (depth, normals,
 //! motion, ids, chromophores) are those of the sample next to its middle. With `smaa-s2x` and `smaa-4x` all are those of the
@@ -29,12 +29,14 @@ use crate::error::{Failure, Outcome};
 use crate::output;
 
 /// Channels that the file is made of.
-pub const CHANNELS: [Channel; 12] = [
+pub const CHANNELS: [Channel; 14] = [
     Channel::Radiance,
     Channel::Diffuse,
     Channel::Irradiance,
+    Channel::Transmitted,
     Channel::Albedo,
     Channel::Direct,
+    Channel::Hair,
     Channel::Depth,
     Channel::Ids,
     Channel::Velocity,
@@ -136,8 +138,10 @@ fn layers(data: &ChannelData, about: &About, all: &mut Vec<AnyChannel<FlatSample
         Channel::Radiance => color("", "RGBA"),
         Channel::Diffuse => color("diffuse.", "RGB"),
         Channel::Irradiance => color("irradiance.", "RGB"),
+        Channel::Transmitted => color("transmittance.", "RGB"),
         Channel::Albedo => color("albedo.", "RGB"),
         Channel::Direct => color("specular.", "RGB"),
+        Channel::Hair => color("hair.", "RGBA"),
         Channel::Normal => {
             for (c, component) in ["N.X", "N.Y", "N.Z"].into_iter().enumerate() {
                 all.push(halves(component, &middles(data, about.size, |texel| texel[c])));

@@ -380,6 +380,7 @@ fn a_head_without_shapes_and_maps_has_nothing_to_lose() {
     bare.mesh.triangles.pop();
     bare.mesh.points.truncate((SIDE * SIDE) as usize);
     bare.mesh.vertices.truncate((SIDE * SIDE) as usize);
+    bare.mesh.occlusion.truncate((SIDE * SIDE) as usize);
     let folder = Folder::new(&bare, r#"{ "expressions": {} }"#);
     let still = folder.sequence("still.json", r#""head": { "yawDegrees": 5 }"#);
     let output = folder.path("reduced.glb");

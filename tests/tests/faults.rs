@@ -14,7 +14,7 @@ use rubor::report::ChartError;
 use rubor::{Outcome, Studio};
 use rubor_assets::import;
 use rubor_renderer::faults::{self, Fault};
-use rubor_renderer::settings::{AntialiasMethod, Output, Quality, ScatterMethod, Settings};
+use rubor_renderer::settings::{AntialiasMethod, BounceMethod, Output, Quality, ScatterMethod, Settings};
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_tests::can_draw;
@@ -83,12 +83,12 @@ const CASES: &[Case] = &[
         ["cubemap_gather", "var weight = place.w;", "var weight = 2.0 * place.w;"],
     ),
     case(
-        "thickness taken twice",
+        "a quarter of the thickness",
         ["ear", "transmit", "shadow-depth"],
         [
-            "shade",
-            "clamp(thickness_mm * params.transmit_per_mm",
-            "clamp(2.0 * thickness_mm * params.transmit_per_mm",
+            "shade_transmit",
+            "clamp(thickness_mm * params.slab.rgb",
+            "clamp(0.25 * thickness_mm * params.slab.rgb",
         ],
     ),
     case(
@@ -121,6 +121,7 @@ fn error(head: &Head, rig: &Rig, scene: &str, flag: &str, choice: &str) -> Outco
         quality: Quality {
             scatter: ScatterMethod::Separable(17),
             antialias: AntialiasMethod::None,
+            bounce: BounceMethod::None,
             shadow_size: 512,
             ..Quality::default()
         },

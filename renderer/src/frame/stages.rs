@@ -8,6 +8,7 @@ use crate::passes::antialias::{self, History, Subsample};
 use crate::passes::backdrop;
 use crate::passes::diffusion::Before;
 use crate::passes::geometry::surface_data;
+use crate::passes::hair::Onto;
 use crate::passes::lens::depth_of_field::Behind;
 use crate::passes::shade::{Lighting, Lit, SkinLight};
 use crate::scene::lamp::{Illumination, place_lights};
@@ -144,9 +145,19 @@ impl<'a> Frame<'a> {
         }
         let velocity = moves.then(|| passes.velocity.record(r, &seen, &self.heads));
         let rest = sums.is_some();
-        passes.cropped_hair.record(r, hair, detail, &seen, &self.heads, rest, &hdr, velocity.as_ref());
+        let onto = Onto::Picture(&hdr, velocity.as_ref());
+        passes.cropped_hair.record(r, hair, detail, &seen, &self.heads, rest, onto);
         let ambient = average_light(self.scene);
-        passes.overlay.record(r, hair, ambient, &seen, &self.heads, &hdr, velocity.as_ref());
+        passes.overlay.record(r, hair, ambient, &seen, &self.heads, onto);
+        if self.keeps(Channel::Hair) {
+            // A new image is zero: nothing covers it.
+            let spec = ImageSpec::light(seen.ids.size()).also(wgpu::TextureUsages::RENDER_ATTACHMENT);
+            let layer = Image::new(r.gpu, "hair", spec);
+            let onto = Onto::Layer(&layer);
+            passes.cropped_hair.record(r, hair, detail, &seen, &self.heads, false, onto);
+            passes.overlay.record(r, hair, ambient, &seen, &self.heads, onto);
+            self.keep([(Channel::Hair, &layer)]);
+        }
         let lighting = Lighting {
             light,
             seen: &seen,
@@ -155,6 +166,12 @@ impl<'a> Frame<'a> {
             quality: &self.settings.quality,
             skin_light: None,
         };
+        if self.keeps(Channel::Transmitted) {
+            let transmittance = passes.transmittance.as_ref().map(|(_, t)| t);
+            let through =
+                passes.shade.record_through(r, &Lighting { transmittance, ..lighting }, &self.heads);
+            self.keep([(Channel::Transmitted, &through)]);
+        }
         let hdr = passes.see_through.record(r, &passes.shade, &lighting, &self.heads, hdr);
 
         self.keep([
@@ -270,10 +287,15 @@ impl<'a> Frame<'a> {
         self.past.frames += u64::from(self.settings.quality.antialias.is_temporal());
     }
 
+    /// Whether a channel will be read back.
+    fn keeps(&self, channel: Channel) -> bool {
+        self.settings.output.channels.contains(&channel)
+    }
+
     /// Holds images that will be read back, so that no later pass reuses them.
     fn keep<'i>(&mut self, images: impl IntoIterator<Item = (Channel, &'i Image)>) {
         for (channel, image) in images {
-            if self.settings.output.channels.contains(&channel) {
+            if self.keeps(channel) {
                 self.kept.insert(channel, image.clone());
             }
         }

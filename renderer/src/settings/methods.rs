@@ -516,7 +516,7 @@ mod tests {
         check::<DepthOfFieldMethod>(&DepthOfFieldMethod::GROUP);
         check::<BackdropMethod>(&BackdropMethod::GROUP);
         check::<DitherMethod>(&DitherMethod::GROUP);
-        assert_eq!(GROUPS.len(), 13, "a new group is checked above");
+        assert_eq!(GROUPS.len(), 14, "a new group is checked above");
         assert_eq!(ScatterMethod::all().count(), ScatterMethod::GROUP.methods.len());
         assert_eq!("reference-surface".parse(), Ok(ScatterMethod::ReferenceSurface(64)));
     }

@@ -226,22 +226,31 @@ impl PhotonWalk {
             y += v * flight;
             z += w * flight;
 
-            let mut heaviest = 0.0f64;
-            for (weight, albedo) in weights.iter_mut().zip(&self.albedos) {
-                *weight *= albedo;
-                heaviest = heaviest.max(*weight);
-            }
-            // Russian roulette by the largest weight: all weights die or are scaled with it.
-            if heaviest < 0.1 {
-                let survival = 0.25;
-                if random.uniform() >= survival {
-                    return;
-                }
-                weights.iter_mut().for_each(|weight| *weight /= survival);
+            if !survives(weights, &self.albedos, || random.uniform()) {
+                return;
             }
             (u, v, w) = scatter((u, v, w), self.anisotropy, random);
         }
     }
+}
+
+/// Weights after a collision, one for each albedo, and whether the photon goes on: Russian roulette by the largest of
+/// them, so that all weights die or are scaled together.
+pub(super) fn survives(weights: &mut [f64], albedos: &[f64], uniform: impl FnOnce() -> f64) -> bool {
+    const HEAVY: f64 = 0.1;
+    const SURVIVAL: f64 = 0.25;
+    let mut heaviest = 0.0f64;
+    for (weight, albedo) in weights.iter_mut().zip(albedos) {
+        // Nothing sees a weight so small, and subnormal numbers take a hundred times as long.
+        *weight = if *weight < 1e-60 { 0.0 } else { *weight * albedo };
+        heaviest = heaviest.max(*weight);
+    }
+    if heaviest >= HEAVY {
+        return true;
+    }
+    let goes_on = uniform() < SURVIVAL;
+    weights.iter_mut().for_each(|weight| *weight /= SURVIVAL);
+    goes_on
 }
 
 /// A new direction by the phase function of Henyey and Greenstein 1941 (sampling: Witt 1977).

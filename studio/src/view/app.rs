@@ -518,20 +518,21 @@ impl App {
         ((full_ms / MOVING_MS).sqrt().ceil() as u32).clamp(1, MOST_DIVISOR)
     }
 
-    fn draw(&mut self, ctx: &egui::Context) {
-        match self.picture.poll() {
-            Ok(true) => {
-                if self.shown.is_some_and(|(_, divisor, overlay)| divisor == 1 && overlay == Overlay::None) {
-                    self.full_ms = Some(self.picture.frame_ms());
-                    if self.picture.drawn() == 1 {
-                        // The first frame compiles shaders; the second tells how long one takes.
-                        self.shown = None;
-                    }
-                }
+    /// Takes what the device has finished.
+    fn poll(&mut self) -> crate::Outcome {
+        let is_full =
+            self.shown.is_some_and(|(_, divisor, overlay)| divisor == 1 && overlay == Overlay::None);
+        if self.picture.poll()? && is_full {
+            self.full_ms = Some(self.picture.frame_ms());
+            if self.picture.drawn() == 1 {
+                // The first frame compiles shaders; the second tells how long one takes.
+                self.shown = None;
             }
-            Ok(false) => {}
-            Err(e) => return self.device_failed(ctx, &e),
         }
+        Ok(())
+    }
+
+    fn draw(&mut self, ctx: &egui::Context) {
         if self.last_version != self.model.version() {
             self.last_version = self.model.version();
             self.changed_at = Instant::now();
@@ -603,8 +604,14 @@ impl App {
             return;
         }
         self.is_lost = true;
-        // A window on a lost device shows nothing any more: what is not saved is written beside its files.
-        let mut message = format!("{e}");
+        // A window on a lost device shows nothing any more.
+        let failure = self.rescue(&e.to_string());
+        self.end(ctx, Some(failure));
+    }
+
+    /// Writes what is not saved beside its files. What happened and where the work is, in words.
+    fn rescue(&mut self, what: &str) -> Failure {
+        let mut message = what.to_owned();
         match self.model.document.rescue() {
             Ok(files) if files.is_empty() => message += "; nothing was unsaved",
             Ok(files) => {
@@ -613,7 +620,7 @@ impl App {
             }
             Err(rescue) => message += &format!("; what was not saved cannot be written: {rescue}"),
         }
-        self.end(ctx, Some(Failure::job(message)));
+        Failure::job(message)
     }
 
     // ---- The end
@@ -700,6 +707,18 @@ impl App {
     }
 }
 
+impl Drop for App {
+    /// The painter of the window panics where its device fails in the middle of a frame: the work is kept all the same.
+    fn drop(&mut self) {
+        if std::thread::panicking() && !self.is_lost {
+            let failure = self.rescue("the window failed");
+            if let Ok(mut slot) = self.outcome.lock() {
+                slot.get_or_insert(failure);
+            }
+        }
+    }
+}
+
 impl eframe::App for App {
     fn raw_input_hook(&mut self, ctx: &egui::Context, input: &mut egui::RawInput) {
         if let Some(mut script) = self.script.take() {
@@ -716,6 +735,13 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
+        // What is painted onto a lost device ends the program.
+        if let Err(e) = self.poll() {
+            self.device_failed(&ctx, &e);
+        }
+        if self.is_lost {
+            return;
+        }
         self.take_changes();
         self.take_live();
         self.take_done(&ctx);

@@ -54,8 +54,6 @@ pub(crate) struct Comparison {
     pub(crate) size: [u32; 2],
     /// The settings that were compared.
     pub(crate) settings: Settings,
-    /// The right picture.
-    pub(crate) reference: RgbImage,
     /// Where the difference is seen.
     pub(crate) difference: RgbImage,
 }
@@ -165,7 +163,6 @@ impl Worker {
             relative_rmse: relative_rmse(&t.linear, &r.linear),
             size,
             settings,
-            reference: reference.picture(),
             difference: difference::picture(&map, size[0], size[1]),
         })
     }

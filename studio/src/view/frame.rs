@@ -26,6 +26,9 @@ use crate::inputs::LoadedHead;
 use crate::plan::spacing_m;
 use crate::studio::{Frame, Studio};
 
+/// Shadow maps of smaller pictures are smaller too, down to this.
+const LEAST_SHADOW_SIZE: u32 = 256;
+
 type Pending = Pin<Box<dyn Future<Output = Result<FrameTimes, RenderError>>>>;
 
 /// The picture.
@@ -206,6 +209,10 @@ impl Picture {
     fn settings(model: &Model, divisor: u32, channels: &[Channel]) -> Settings {
         let mut settings = model.settings.clone();
         settings.output.size = settings.output.size.map(|n| n.div_ceil(divisor.max(1)));
+        if divisor > 1 {
+            let shadow_size = &mut settings.quality.shadow_size;
+            *shadow_size = (*shadow_size / divisor).max(LEAST_SHADOW_SIZE.min(*shadow_size));
+        }
         settings.output.channels = channels.to_vec();
         if !channels.is_empty() {
             // Ids number the triangles of the whole head.

@@ -89,9 +89,7 @@ pub fn open(options: Options) -> Outcome {
     let outcome: Arc<Mutex<Option<Failure>>> = Arc::default();
     let of_window = outcome.clone();
     let start = Start { model, preset, live, adapter, script };
-    let ran = eframe::run_native(
-        "rubor view",
-        native,
+    let create: eframe::AppCreator<'_> =
         Box::new(move |context| match App::new(context, start, of_window.clone()) {
             Ok(app) => Ok(Box::new(app)),
             Err(failure) => {
@@ -101,11 +99,14 @@ pub fn open(options: Options) -> Outcome {
                 }
                 Err(message.into())
             }
-        }),
-    );
+        });
+    // A panic has dropped the app, which has kept the work and says so.
+    let run = || eframe::run_native("rubor view", native, create);
+    let ran = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run));
     if let Some(failure) = outcome.lock().ok().and_then(|mut slot| slot.take()) {
         return Err(failure);
     }
+    let ran = ran.map_err(|_| Failure::job("the window failed"))?;
     ran.map_err(|e| Failure::job(format!("the window cannot be opened: {e}")).hint(HINT))
 }
 

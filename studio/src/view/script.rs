@@ -301,6 +301,7 @@ impl Script {
     /// Moves a slider by itself until a number of frames were shown.
     fn measure(&mut self, frames: u32, name: &str, app: &mut App, ctx: &egui::Context) -> Outcome<bool> {
         let Some(found) = self.find(name, ctx)? else { return Ok(false) };
+        let is_first = self.measuring.is_none();
         let (start, first) = *self.measuring.get_or_insert_with(|| (Instant::now(), app.picture.drawn()));
         let drawn = app.picture.drawn() - first;
         let share = 0.5 + 0.4 * (start.elapsed().as_secs_f32() * 2.0).sin();
@@ -314,7 +315,7 @@ impl Script {
             return Ok(true);
         }
         let mut events = vec![Event::PointerMoved(at)];
-        if drawn == 0 {
+        if is_first {
             events.push(pressed(at, PointerButton::Primary, true));
         }
         self.moves.push_back(events);

@@ -6,9 +6,8 @@
 //!
 //! Values are given as JSON text and are put in as they are, so that a key of a track stays on one line.
 
-use jsonc_parser::ParseOptions;
 use jsonc_parser::cst::{CstArray, CstInputValue, CstNode, CstObject, CstRootNode};
-use rubor_rig::json::Step;
+use rubor_rig::json::{SYNTAX, Step};
 
 /// An edit that has no place in the text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -127,20 +126,7 @@ fn wrong(path: &[Step], found: &str, expected: &'static str) -> EditError {
 /// The byte order mark, which stays, and the tree of the rest.
 fn parse(text: &str) -> Result<(&str, CstRootNode), EditError> {
     let (mark, text) = text.split_at(if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 });
-    // As `rubor_rig::json` reads it.
-    let options = ParseOptions {
-        allow_comments: true,
-        allow_trailing_commas: true,
-        allow_loose_object_property_names: false,
-        allow_missing_commas: false,
-        allow_single_quoted_strings: false,
-        allow_hexadecimal_numbers: false,
-        allow_unary_plus_numbers: false,
-        allow_bare_decimal_point_numbers: false,
-        allow_non_finite_numbers: false,
-        allow_extended_string_escapes: false,
-    };
-    CstRootNode::parse(text, &options).map(|root| (mark, root)).map_err(|e| EditError {
+    CstRootNode::parse(text, &SYNTAX).map(|root| (mark, root)).map_err(|e| EditError {
         at: "text".into(),
         found: e.to_string(),
         expected: "JSON",

@@ -172,7 +172,7 @@ mod tests {
         let path = folder.path().join("rig.json");
         std::fs::write(&path, "{}").unwrap();
         let (sender, woken) = mpsc::channel();
-        let watcher = Watcher::new(move || drop(sender.send(())));
+        let watcher = Watcher::new(move || sender.send(()).unwrap_or_default());
         watcher.set(vec![(Role::Rig, path.clone())]);
         let told = |is_gone| vec![Change { role: Role::Rig, path: path.clone(), is_gone }];
         let mut slowest = Duration::ZERO;

@@ -49,6 +49,7 @@ pub(crate) enum Channel {
 pub(crate) struct Methods {
     pub(crate) scatter: &'static str,
     pub(crate) transmit: &'static str,
+    pub(crate) bounce: &'static str,
     pub(crate) curvature: &'static str,
     pub(crate) color: &'static str,
     pub(crate) wrinkles: &'static str,
@@ -86,6 +87,7 @@ pub(crate) struct Case {
 const USUAL: Methods = Methods {
     scatter: "separable:17",
     transmit: "shadow-depth",
+    bounce: "patches",
     curvature: "mesh",
     color: "hemoglobin",
     wrinkles: "partial-derivative",
@@ -119,8 +121,7 @@ impl Methods {
         Some(match group {
             "scatter" => self.scatter,
             "transmit" => self.transmit,
-            // The default, in all of them.
-            "bounce" => "patches",
+            "bounce" => self.bounce,
             "curvature" => self.curvature,
             "color" => self.color,
             "wrinkles" => self.wrinkles,
@@ -142,6 +143,7 @@ pub(crate) fn all() -> Vec<Case> {
     [
         scatter(),
         transmit(),
+        bounce(),
         appearance(),
         antialias(),
         lights(),
@@ -210,6 +212,13 @@ fn transmit() -> Vec<Case> {
     let through = Methods { scatter: "dipole-cubemap:16", exposure: 1.4, ..USUAL };
     all.push(case("transmit-dipole-cubemap", "ear", through));
     all
+}
+
+/// The open mouth, which skin on all sides lights.
+fn bounce() -> Vec<Case> {
+    let picture =
+        |bounce: &'static str| case(&format!("bounce-{bounce}"), "mouth", Methods { bounce, ..USUAL });
+    ["none", "patches"].map(picture).to_vec()
 }
 
 /// Alpha with holes and a shadow, by both ways to make pixels of triangles.

@@ -146,9 +146,7 @@ fn faults_of_the_set(cases: &[Case], hashes: &Hashes, tolerances: &Tolerances) -
                 let name = case.methods.of_group(group.name).unwrap_or_default();
                 name.split(':').next() == Some(method.name)
             };
-            // `renderer/src/passes/bounce` compares the frame without it with one of no light to send.
-            let is_tested_elsewhere = (group.name, method.name) == ("bounce", "none");
-            if !is_tested_elsewhere && !cases.iter().any(shows) {
+            if !cases.iter().any(shows) {
                 faults.push(format!("{} {}: no picture shows it", group.name, method.name));
             }
         }

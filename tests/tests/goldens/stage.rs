@@ -229,6 +229,7 @@ impl Stage {
             quality: Quality {
                 scatter: methods.scatter.parse()?,
                 transmit: methods.transmit.parse()?,
+                bounce: methods.bounce.parse()?,
                 curvature: methods.curvature.parse()?,
                 color: methods.color.parse()?,
                 raster: methods.raster.parse()?,

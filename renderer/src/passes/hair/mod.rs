@@ -11,9 +11,19 @@ use crate::device::{
 };
 use crate::passes::geometry::raster::Rasteriser;
 
-/// Pipelines that draw premultiplied colours over half float images: colour only, and colour with motion.
+/// What hairs are drawn onto.
+#[derive(Clone, Copy)]
+pub(crate) enum Onto<'a> {
+    /// A picture and, where there is one, its motion.
+    Picture(&'a Image, Option<&'a Image>),
+    /// An image of hairs alone, with their coverage.
+    Layer(&'a Image),
+}
+
+/// Pipelines that draw premultiplied colours over half float images: colour only, colour with motion, and colour with
+/// coverage.
 struct Blended {
-    kernels: [RasterKernel; 2],
+    kernels: [RasterKernel; 3],
     /// Whether the shader tests depth, as there is no depth texture.
     tests_depth: bool,
 }
@@ -28,12 +38,15 @@ impl Blended {
     ) -> Self {
         let tests_depth = rasteriser.stores_depth();
         let program = program.flag("tests_depth", tests_depth).flag("stored_shadows", tests_depth);
-        let target = Some(wgpu::ColorTargetState {
-            format: wgpu::TextureFormat::Rgba16Float,
-            blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-            write_mask: wgpu::ColorWrites::COLOR,
-        });
-        let targets = [target.clone(), target];
+        let target = |write_mask| {
+            Some(wgpu::ColorTargetState {
+                format: wgpu::TextureFormat::Rgba16Float,
+                blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+                write_mask,
+            })
+        };
+        let targets = [wgpu::ColorWrites::COLOR; 2].map(target);
+        let with_coverage = [target(wgpu::ColorWrites::ALL)];
         let kernel = |targets: &[Option<wgpu::ColorTargetState>]| {
             let raster = Raster {
                 label,
@@ -46,19 +59,23 @@ impl Blended {
             };
             RasterKernel::new(gpu, &raster)
         };
-        Self { kernels: [kernel(&targets[..1]), kernel(&targets)], tests_depth }
+        Self { kernels: [kernel(&targets[..1]), kernel(&targets), kernel(&with_coverage)], tests_depth }
     }
 
-    /// Draws over a picture and, where there is one, its motion; depth is only tested. Each draw gets the depth as
-    /// `scene_depth`.
+    /// Draws over what is there; depth is only tested. Each draw gets the depth as `scene_depth`.
     fn record<'r>(
         &self,
         r: &mut Recorder<'_>,
-        [hdr, depth]: [&'r Image; 2],
-        velocity: Option<&Image>,
+        onto: Onto<'_>,
+        depth: &'r Image,
         each: impl Iterator<Item = (Vec<Resource<'r>>, Draw<'r>)>,
     ) {
-        let images = std::iter::once(hdr).chain(velocity);
+        let (kernel, first, second) = match onto {
+            Onto::Picture(hdr, None) => (&self.kernels[0], hdr, None),
+            Onto::Picture(hdr, velocity) => (&self.kernels[1], hdr, velocity),
+            Onto::Layer(layer) => (&self.kernels[2], layer, None),
+        };
+        let images = std::iter::once(first).chain(second);
         let attachments = Attachments {
             colors: images.map(|image| color_attachment(image.view(), wgpu::LoadOp::Load)).collect(),
             depth: if self.tests_depth { None } else { depth_attachment(depth.view(), wgpu::LoadOp::Load) },
@@ -67,6 +84,6 @@ impl Blended {
             resources.push(("scene_depth", depth.bound()));
             (resources, draw)
         });
-        r.draw_each(&self.kernels[usize::from(velocity.is_some())], attachments, each);
+        r.draw_each(kernel, attachments, each);
     }
 }

@@ -112,10 +112,12 @@ const SHADER: Module = module!("shade", "shade.wesl");
 const SAMPLES_SHADER: Module = module!("shade_light_samples", "light_samples.wesl");
 const TILES_SHADER: Module = module!("shade_tiles", "tiles.wesl");
 const AUTHORED_SHADER: Module = module!("shade_authored", "authored.wesl");
-const PARTS: [Module; 3] = [
+const THROUGH_SHADER: Module = module!("shade_through", "through.wesl");
+const PARTS: [Module; 4] = [
     module!("shade_eye", "eye.wesl"),
     module!("shade_micro", "micro.wesl"),
     module!("shade_mouth", "mouth.wesl"),
+    module!("shade_transmit", "transmit.wesl"),
 ];
 
 /// Share of a neighbour's light that scattering returns to the centre per millimetre of distance from the centre's
@@ -149,6 +151,11 @@ pub(crate) fn listed_program(only_skin: bool) -> Program {
 /// The shader of the pass that lights what keeps the material of its author.
 pub(crate) fn authored_program() -> Program {
     with_constants(Program::new(AUTHORED_SHADER).with(&[SHADER]))
+}
+
+/// The shader of the pass for the light that came through thin parts.
+pub(crate) fn through_program() -> Program {
+    importing(THROUGH_SHADER, None)
 }
 
 /// The shader of the pass with a rule for skin: `modules` hold `package::skin_light`.
@@ -408,6 +415,8 @@ pub(crate) struct Shade {
     skin_light_kernels: Mutex<Vec<(&'static str, Arc<Kernel>)>>,
     /// Made by the first frame that shows a material of an author.
     authored_kernel: OnceLock<AuthoredKernels>,
+    /// Made by the first frame that keeps the light that came through thin parts.
+    through_kernel: OnceLock<Kernel>,
     /// Whether shadow maps are floats and no depth textures.
     stored_shadows: bool,
     trilinear_repeat: wgpu::Sampler,
@@ -442,6 +451,7 @@ impl Shade {
             stored_shadows,
             skin_light_kernels: Mutex::default(),
             authored_kernel: OnceLock::new(),
+            through_kernel: OnceLock::new(),
             trilinear_repeat: sampler(&wgpu::SamplerDescriptor {
                 label: Some("trilinear repeat"),
                 address_mode_u: wgpu::AddressMode::Repeat,
@@ -553,6 +563,32 @@ impl Shade {
 
     fn authored_kernels(&self, gpu: &Gpu) -> &AuthoredKernels {
         self.authored_kernel.get_or_init(|| AuthoredKernels::new(gpu, self.stored_shadows))
+    }
+
+    /// The part of [`Lit::irradiance`] that came through thin parts, by itself; zero where `lighting` has no transmittance.
+    pub(crate) fn record_through(
+        &self,
+        r: &mut Recorder<'_>,
+        lighting: &Lighting<'_>,
+        heads: &[PosedHead<'_>],
+    ) -> Image {
+        let kernel = self.through_kernel.get_or_init(|| {
+            let program = through_program().flag("stored_shadows", self.stored_shadows);
+            Kernel::new(r.gpu, "light through", &program, "through")
+        });
+        // A new image is zero, and nothing is written where there is no skin.
+        let through = Image::new(r.gpu, "light through", ImageSpec::light(lighting.seen.ids.size()));
+        if lighting.transmittance.is_none() {
+            return through;
+        }
+        let params: Vec<_> = heads.iter().map(|h| r.uniform("light through", &params(lighting, h))).collect();
+        let each = heads.iter().zip(&params).map(|(h, params)| {
+            let mut resources = self.resources(lighting, h, params);
+            resources.extend([("depth", lighting.seen.depth.bound()), ("through_out", through.bound())]);
+            (resources, lighting.seen.groups(h.index))
+        });
+        r.dispatch_each(kernel, each);
+        through
     }
 
     /// Adds the light of a layer that is seen through, whose ids are those of `lighting`, to that of the layers before.

@@ -467,3 +467,45 @@ fn tiles_that_are_listed_get_the_light_of_whole_windows() {
     renderer.shade().forget_tiles();
     assert!(light(&mut renderer) == listed, "the light is the same to the bit");
 }
+
+#[test]
+fn light_that_came_through_is_what_no_transmittance_lacks() {
+    let Some(mut renderer) = renderer() else { return };
+    let head = dome();
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("it uploads");
+    let state = FaceState::neutral(&head);
+    let lamps = [Vec3::new(0.5, -0.3, 1.0), Vec3::new(0.3, -0.6, -1.0)].map(|direction| Light {
+        kind: LightKind::Directional { direction },
+        color_linear: Vec3::new(2.0, 1.5, 1.0),
+        radius: 0.02,
+        casts_shadow: true,
+    });
+    let scene = Scene {
+        heads: &[HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }],
+        camera: Camera { position: 0.5 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 32.0 },
+        lights: &lamps,
+        environment: None,
+        environment_rotation: 0.0,
+        environment_intensity: 0.0,
+        background_linear: Vec3::ZERO,
+        optics: Default::default(),
+    };
+    let mut light = |transmit: TransmitMethod| {
+        let mut settings = settings([48, 48]);
+        settings.quality.transmit = transmit;
+        settings.output.channels = vec![Channel::Irradiance, Channel::Transmitted];
+        render(&mut renderer, &scene, &settings).expect("it draws");
+        [Channel::Irradiance, Channel::Transmitted].map(|c| read_texels(&renderer, c))
+    };
+    let [without, nothing] = light(TransmitMethod::None);
+    let [with, through] = light(TransmitMethod::ShadowDepth);
+    assert!(nothing.iter().all(|t| t[..3] == [0.0; 3]));
+    let lit = through.iter().filter(|t| t[0] > 0.01).count();
+    assert!(lit > 100, "light comes through at {lit} pixels");
+    for i in 0..with.len() {
+        for c in 0..3 {
+            let [all, rest, part] = [with[i][c], without[i][c], through[i][c]];
+            assert!((all - rest - part).abs() <= 1e-3 * all + 1e-6, "pixel {i}: {all} of {rest} and {part}");
+        }
+    }
+}

@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::medium::{ETA, fresnel_from_inside};
-use super::monte_carlo::MAX_ALBEDO;
+use super::monte_carlo::{MAX_ALBEDO, survives};
 use crate::error::SkinError;
 use crate::random::SplitMix64;
 
@@ -109,7 +109,7 @@ impl SlabWalk {
                 let way = if w < 0.0 { -z / w } else { (self.thickness - z) / w };
                 let fresnel = fresnel_from_inside(w.abs(), self.eta);
                 let leaving = (1.0 - fresnel) * (-way).exp();
-                if leaving > 0.0 {
+                if leaving > 1e-30 {
                     let radius = (x + u * way).hypot(y + v * way);
                     for (sum, weight) in sums.iter_mut().zip(&*weights) {
                         let light = weight * leaving;
@@ -133,18 +133,8 @@ impl SlabWalk {
                 flight -= way;
             }
             (x, y, z) = (x + u * flight, y + v * flight, z + w * flight);
-            let mut heaviest = 0.0f64;
-            for (weight, albedo) in weights.iter_mut().zip(&self.albedos) {
-                *weight *= albedo;
-                heaviest = heaviest.max(*weight);
-            }
-            // Russian roulette by the largest weight: all weights die or are scaled with it.
-            if heaviest < 0.1 {
-                let survival = 0.25;
-                if random.uniform() >= survival {
-                    return;
-                }
-                weights.iter_mut().for_each(|weight| *weight /= survival);
+            if !survives(weights, &self.albedos, || random.uniform()) {
+                return;
             }
             w = 2.0 * random.uniform() - 1.0;
             let (sin, cos) = (std::f64::consts::TAU * random.uniform()).sin_cos();

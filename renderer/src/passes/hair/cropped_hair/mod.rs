@@ -33,10 +33,10 @@ mod tests;
 
 use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
-use crate::device::{Bind, Draw, Gpu, Image, Kernel, Recorder};
+use crate::device::{Bind, Draw, Gpu, Kernel, Recorder};
 use crate::passes::geometry::raster::Rasteriser;
-use crate::passes::hair::Blended;
 use crate::passes::hair::fibre::{self, Fibre};
+use crate::passes::hair::{Blended, Onto};
 use crate::scene::PosedHead;
 use crate::scene::hair_roots::{WIDTH_METRES, drawn_hairs};
 use crate::scene::lamp::Illumination;
@@ -190,7 +190,7 @@ impl CroppedHair {
         r.dispatch_each(kernel, each);
     }
 
-    /// Draws the hairs of heads, or the `rest` that [`CroppedHair::cover`] left, over a picture and, where there is one, over its motion.
+    /// Draws the hairs of heads, or the `rest` that [`CroppedHair::cover`] left.
     pub(crate) fn record(
         &self,
         r: &mut Recorder<'_>,
@@ -199,8 +199,7 @@ impl CroppedHair {
         seen: &Seen,
         heads: &[PosedHead<'_>],
         rest: bool,
-        hdr: &Image,
-        velocity: Option<&Image>,
+        onto: Onto<'_>,
     ) {
         let drawn = self.drawn(heads, |h| !rest || self.way(seen, h) == Way::Blended);
         if drawn.is_empty() {
@@ -214,7 +213,7 @@ impl CroppedHair {
             .iter()
             .zip(&params)
             .map(|(h, params)| (vec![("hairs", h.hairs.bound())], Draw::Corners(params.count * 3)));
-        self.kernels.record(r, [hdr, &seen.depth], velocity, each);
+        self.kernels.record(r, onto, &seen.depth, each);
     }
 }
 

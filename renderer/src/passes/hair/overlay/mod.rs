@@ -17,10 +17,10 @@ use glam::Vec3;
 use rubor_rig::head::Material;
 
 use crate::device::wgsl::{Module, Program, module};
-use crate::device::{Bind, Draw, Gpu, Image, Recorder};
+use crate::device::{Bind, Draw, Gpu, Recorder};
 use crate::passes::geometry::raster::Rasteriser;
-use crate::passes::hair::Blended;
 use crate::passes::hair::fibre::{self, Fibre};
+use crate::passes::hair::{Blended, Onto};
 use crate::scene::PosedHead;
 use crate::scene::lamp::Illumination;
 use crate::scene::view::Seen;
@@ -55,8 +55,7 @@ impl Overlay {
         Self { kernels: Blended::new(gpu, rasteriser, "overlay", program(), entries) }
     }
 
-    /// Draws the blended triangles of heads over a picture and, where there is one, over its motion. `ambient` is the
-    /// irradiance / pi that cards and films see on average.
+    /// Draws the blended triangles of heads. `ambient` is the irradiance / pi that cards and films see on average.
     pub(crate) fn record(
         &self,
         r: &mut Recorder<'_>,
@@ -64,8 +63,7 @@ impl Overlay {
         ambient: Vec3,
         seen: &Seen,
         heads: &[PosedHead<'_>],
-        hdr: &Image,
-        velocity: Option<&Image>,
+        onto: Onto<'_>,
     ) {
         let drawn: Vec<_> = heads.iter().filter(|h| h.head.overlay_triangles > 0).collect();
         if drawn.is_empty() {
@@ -96,6 +94,6 @@ impl Overlay {
             resources.extend(fibre.resources(&hair_light, light));
             (resources, Draw::Corners(h.head.overlay_triangles * 3))
         });
-        self.kernels.record(r, [hdr, &seen.depth], velocity, each);
+        self.kernels.record(r, onto, &seen.depth, each);
     }
 }
