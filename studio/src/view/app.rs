@@ -554,8 +554,15 @@ impl App {
             return;
         }
         if self.picture.is_busy() {
-            // The device tells when it is done.
-            return;
+            if !self.picture.gpu().is_software() || !self.is_moving() {
+                // The device tells when it is done.
+                return;
+            }
+            // A processor draws window and picture in turn: without a new picture, painting the window would hold it up.
+            self.picture.wait();
+            if let Err(e) = self.poll() {
+                return self.device_failed(ctx, &e);
+            }
         }
         let channels = wanted.2.channels();
         match self.picture.draw(&self.model, wanted.1, channels) {

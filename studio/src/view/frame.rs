@@ -221,6 +221,12 @@ impl Picture {
         settings
     }
 
+    /// Waits until the device has finished what it was given.
+    pub(crate) fn wait(&self) {
+        // A lost device is said by `poll`.
+        let _ = self.gpu().device.poll(wgpu::PollType::wait_indefinitely());
+    }
+
     /// Looks, without waiting, at what the device has finished. Whether there is news.
     ///
     /// # Errors
