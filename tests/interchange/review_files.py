@@ -51,9 +51,12 @@ for path in files:
     light = {name: channels[name].astype("f8") for name in channels if channels[name].dtype == numpy.float16}
     skin = channels["mask.skin"] == 1
     expect(skin.sum() > width * height / 20, f"{path.name}: {skin.sum()} pixels of skin")
-    total = light["diffuse.R"] * light["albedo.R"] + light["specular.R"]
-    share = (abs(total - light["R"])[skin] < 4e-3 * total[skin] + 1e-4).mean()
-    expect(share > 0.6, f"{path.name}: beauty is the sum of its parts in {share:.0%} of the skin")
+    total = (light["diffuse.R"] * light["albedo.R"] + light["specular.R"]) * (1 - light["hair.A"]) + light["hair.R"]
+    bound = numpy.where(light["hair.A"] > 0, 0.025, 4e-3) * total + 1e-4
+    share = (abs(total - light["R"]) < bound)[channels["id.part"] > 0].mean()
+    expect(share > 0.999, f"{path.name}: beauty is the sum of its parts in {share:.1%} of the head")
+    through = light["transmittance.R"]
+    expect((through >= 0).all() and (through <= 1.001 * light["irradiance.R"] + 1e-4).all(), f"{path.name}: light through")
     length = numpy.sqrt(sum(light[f"N.{axis}"] ** 2 for axis in "XYZ"))[skin]
     expect(abs(length - 1).max() < 0.15, f"{path.name}: normals of length {length.min()} to {length.max()}")
     blood = channels["chromophores.hemoglobin"][skin]

@@ -11,6 +11,9 @@ use super::document::{Document, Kind};
 use super::syntax::{self, number, quoted};
 use crate::error::{Failure, Outcome};
 
+/// Keys of a track and its place in the text of the sequence.
+pub type Keyed = (Vec<Step>, Vec<Key<f32>>);
+
 /// A track.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row<'a> {
@@ -283,7 +286,7 @@ impl Document {
     /// Keys that a track cannot have; nothing has changed then.
     pub fn set_tracks(
         &mut self,
-        tracks: &[(Vec<Step>, Vec<Key<f32>>)],
+        tracks: &[Keyed],
         label: &str,
         mark: Option<&str>,
     ) -> Outcome {

@@ -6,11 +6,10 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use rubor_rig::json::Step;
 use rubor_rig::timeline::{Ease, Key};
 
 use super::super::pose::{Group, Pose};
-use super::super::tracks::path_of;
+use super::super::tracks::{Keyed, path_of};
 
 /// Largest change of a weight by what is left out.
 const WEIGHT_ERROR: f32 = 0.004;
@@ -66,7 +65,7 @@ impl Recorder {
     }
 
     /// The tracks and the time at which the last key stands, seconds. Tracks that stay 0 are left out.
-    pub fn tracks(self) -> (Vec<(Vec<Step>, Vec<Key<f32>>)>, f64) {
+    pub fn tracks(self) -> (Vec<Keyed>, f64) {
         let mut end = 0.0f64;
         let mut tracks = Vec::new();
         for ((field, name), samples) in self.series {
