@@ -60,6 +60,8 @@ fn is_foreign(c: char) -> bool {
 const UNFINISHED: &str = ".rubor-";
 /// Where locks do not tell, an unfinished file of this age is nobody's.
 const ABANDONED: std::time::Duration = std::time::Duration::from_secs(24 * 3600);
+/// An empty file of this age may be one that somebody has just made and not locked yet.
+const FRESH: std::time::Duration = std::time::Duration::from_secs(2);
 /// What the name of an unfinished file has before its extension.
 const PART: &str = ".part";
 
@@ -96,7 +98,8 @@ pub fn replace_with(
     // Some file systems have no locks; there, what is being made counts as left over. Locks of Windows would also stop
     // `make` from writing by the name.
     #[cfg(unix)]
-    let _ = part.as_file().try_lock();
+    // Whoever looks whether it is locked holds the lock for a moment.
+    let _ = part.as_file().lock();
     let name = part.path().to_owned();
     make(part.as_file_mut(), &name)?;
     part.as_file().sync_all()?;
@@ -112,10 +115,11 @@ pub fn remove_unfinished(folder: &Path) -> usize {
         let Some(metadata) = path.symlink_metadata().ok().filter(std::fs::Metadata::is_file) else {
             return false;
         };
+        let age = metadata.modified().ok().and_then(|at| at.elapsed().ok()).unwrap_or_default();
         if cfg!(unix) {
-            File::open(path).is_ok_and(|file| file.try_lock().is_ok())
+            (metadata.len() > 0 || age > FRESH) && File::open(path).is_ok_and(|file| file.try_lock().is_ok())
         } else {
-            metadata.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED))
+            age > ABANDONED
         }
     };
     let is_unfinished = |name: &str| name.starts_with(UNFINISHED) && name.contains(PART);
@@ -191,6 +195,21 @@ mod tests {
         assert!(names.into_iter().all(|n| !n.to_string_lossy().contains(PART)));
         assert!(replace(&folder.path().join("none/a.txt"), b"four").is_err());
     }
+
+    #[test]
+    fn many_threads_write_into_one_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |thread: usize| {
+            for i in 0..60 {
+                let path = folder.path().join(format!("{thread}.{i}.txt"));
+                replace(&path, path.to_string_lossy().as_bytes()).unwrap();
+                assert_eq!(std::fs::read_to_string(&path).unwrap(), path.to_string_lossy());
+            }
+        };
+        std::thread::scope(|scope| (0..8).for_each(|thread| drop(scope.spawn(move || write(thread)))));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 8 * 60);
+    }
+
     #[test]
     fn leftovers_of_killed_runs_go_and_those_of_running_ones_stay() {
         let folder = tempfile::tempdir().unwrap();

@@ -284,12 +284,7 @@ impl Document {
     ///
     /// # Errors
     /// Keys that a track cannot have; nothing has changed then.
-    pub fn set_tracks(
-        &mut self,
-        tracks: &[Keyed],
-        label: &str,
-        mark: Option<&str>,
-    ) -> Outcome {
+    pub fn set_tracks(&mut self, tracks: &[Keyed], label: &str, mark: Option<&str>) -> Outcome {
         let mut text = self.part(Kind::Sequence).text().to_owned();
         for (path, keys) in tracks {
             text = syntax::set(&text, path, &keys_text(keys)).map_err(Failure::input)?;
