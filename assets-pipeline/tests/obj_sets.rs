@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use rubor_assets::import::obj::{GroupBy, read_polygons};
+use rubor_assets::import::obj::{GroupBy, from_bytes as read_obj, read_polygons};
 use rubor_assets::import::obj_set::{Options, Units, import};
 use rubor_rig::head::Material;
 
@@ -87,6 +87,14 @@ fn broken_sets_say_file_place_found_and_expected() {
     fs::write(bytes.0.join("neutral.obj"), [0xff, 0xfe, b'\n', 0, b'f', b' ', 0xc3]).unwrap();
     assert!(bytes.import().is_err());
     assert!(read_polygons(Path::new("/nowhere.obj"), GroupBy::Group).is_err());
+}
+
+/// Found by fuzzing: `tobj` takes a coordinate that does not exist for none where the file has none at all.
+#[test]
+fn corners_need_the_texture_coordinates_that_they_name() {
+    let text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2/1 2\n";
+    let error = read_obj(text, Path::new("a.obj"), GroupBy::Group).unwrap_err().to_string();
+    assert!(error.contains("a texture coordinate from 1 to 0"), "{error}");
 }
 
 #[test]

@@ -158,12 +158,10 @@ fn a_killed_import_or_export_leaves_no_half_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let head = folder.path().join("head.glb");
     std::fs::write(&head, include_bytes!("../../assets/head.glb")).expect("a head");
-    for (what, file) in [("import", "a.glb"), ("export", "a.usda")] {
-        let arguments =
-            |out: &Path| -> Vec<String> { [what, text(&head), "-o", text(out)].map(str::to_owned).to_vec() };
+    for (what, flag, file) in [("import", None, "a.glb"), ("export", Some("--head"), "a.usda")] {
         let run = |out: &Path| {
-            let arguments = arguments(out);
-            command(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+            let arguments = [Some(what), flag, Some(text(&head)), Some("-o"), Some(text(out))];
+            command(&arguments.into_iter().flatten().collect::<Vec<_>>())
         };
         let whole = folder.path().join(format!("whole-{what}"));
         std::fs::create_dir(&whole).expect("a folder");

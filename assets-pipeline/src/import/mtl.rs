@@ -94,7 +94,10 @@ impl Library {
             has_begun |= keyword == "newmtl";
             // `tobj` gives up at the first fault and does not say where.
             let alone = if keyword == "newmtl" { format!("{line}\n") } else { format!("newmtl a\n{line}\n") };
-            if !has_begun || tobj::load_mtl_buf(&mut alone.as_bytes()).is_err() {
+            let mut words = line.split_whitespace();
+            // `tobj` panics on a colour of fewer numbers.
+            let is_short = ["Ka", "Kd", "Ks", "Ke"].map(Some).contains(&words.next()) && words.count() < 3;
+            if !has_begun || is_short || tobj::load_mtl_buf(&mut alone.as_bytes()).is_err() {
                 notes.add(
                     "lines of materials that cannot be read are left out",
                     format!("{file}, line {}", i + 1),
@@ -368,5 +371,17 @@ mod tests {
         assert!((at - Vec2::new(1.25, 0.25)).length() < 1e-6, "{at}");
         assert_eq!(options("-imfchan r -mm 0 1 a.png").1, "a.png");
         assert_eq!(options("-odd-name.png").1, "-odd-name.png");
+    }
+
+    /// Found by fuzzing: `tobj` unwraps three numbers.
+    #[test]
+    fn colours_of_fewer_than_three_numbers_are_left_out_and_said() {
+        for line in ["Kd", "Ka 1", "Ks 1 0", "Ke\u{a0}1 0", " Kd\u{3000}1"] {
+            let text = format!("newmtl skin\n{line}\nKd 0.5 0.25 0.125\n");
+            let mut notes = Notes::default();
+            let library = Library::from_bytes(Path::new(""), text.as_bytes(), &mut notes);
+            assert_eq!(library.names(), ["skin"], "{line:?}");
+            assert!(notes.into_vec().iter().any(|n| n.message.contains("cannot be read")), "{line:?}");
+        }
     }
 }

@@ -424,7 +424,9 @@ impl<'a> Reader<'a> {
             for _ in 0..arity(f + 1) {
                 let uv = match self.without_uv[corner] {
                     true => missing,
-                    false => read.texcoord_indices[all + corner],
+                    false => *read.texcoord_indices.get(all + corner).ok_or_else(|| {
+                        self.fault("corners with texture coordinates, of which the file has none")
+                    })?,
                 };
                 mesh.corners.push(Corner { point: read.indices[all + corner], uv });
                 corner += 1;
