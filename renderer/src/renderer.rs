@@ -314,8 +314,7 @@ impl Renderer {
         };
         let heads = self.prepare(scene, settings)?;
         let scene = &Scene { heads: &heads, ..*scene };
-        let directional = settings.quality.profile.directional().is_some();
-        self.passes.shade.prepare_samples(&self.gpu, directional);
+        self.passes.shade.prepare_samples(&self.gpu, surface::needs_normals(&settings.quality));
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         self.images.begin_frame();
         self.timer.restart();

@@ -45,11 +45,11 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
         assert_workgroups(&shade::authored_program(), &square(entry));
     }
     assert_workgroups(&shade::through_program(), &square("through"));
-    assert_workgroups(&bounce::emit_program(), &line("emit"));
-    for again in [false, true] {
-        for entry in ["average", "gather"] {
-            assert_workgroups(&bounce::bounce_program(again), &line(entry));
-        }
+    for shares_lamps in [false, true] {
+        assert_workgroups(&bounce::emit_program(shares_lamps), &line("emit"));
+    }
+    for entry in ["send_on", "gather"] {
+        assert_workgroups(&bounce::bounce_program(), &line(entry));
     }
     assert_workgroups(&bounce::smooth_program(), &line("smooth_light"));
     assert_workgroups(&see_through::behind_program(), &square("behind"));

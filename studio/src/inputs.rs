@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rubor_assets::convert::own_color;
 use rubor_assets::{check, import, synthesize};
+use rubor_renderer::MAX_HEADS;
 use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_rig::json;
@@ -36,6 +37,17 @@ pub struct LoadedHead {
     pub extent: import::gltf::Extent,
     /// What the reader left out, guessed or repaired.
     pub notes: Vec<Note>,
+}
+
+/// Refuses more heads than a frame has, before they take memory.
+///
+/// # Errors
+/// More than [`MAX_HEADS`].
+pub fn check_number_of_heads(count: usize) -> Outcome {
+    if count > MAX_HEADS {
+        return Err(Failure::input(format!("found {count} heads, expected at most {MAX_HEADS} in a frame")));
+    }
+    Ok(())
 }
 
 /// The head of a file (`.glb`, `.gltf`, `.vrm`, `.obj`, `.usda`, `.usdz`), or the built-in one. Textured skin of other

@@ -289,10 +289,12 @@ impl Job {
     /// Loads the heads.
     ///
     /// # Errors
-    /// A file that is missing, is no head, or has changed since the job was written; an environment that has.
+    /// More heads than a frame has; a file that is missing, is no head, or has changed since the job was written; an environment that
+    /// has.
     pub fn load_heads(&self) -> Outcome<Vec<LoadedHead>> {
         let built_in = [InputFile { file: None, fingerprint: Fingerprint::default() }];
         let sources = if self.heads.is_empty() { &built_in } else { &self.heads[..] };
+        inputs::check_number_of_heads(sources.len())?;
         let mut heads = Vec::new();
         for source in sources {
             let loaded = inputs::head(source.file.as_deref())?;
@@ -553,6 +555,15 @@ mod tests {
         job.heads = vec![InputFile { file: None, fingerprint: Fingerprint::of(b"another") }];
         let message = job.load_heads().unwrap_err().to_string();
         assert!(message.contains("changed") && message.contains("hint"), "{message}");
+    }
+
+    #[test]
+    fn more_heads_than_a_frame_has_are_refused_before_they_are_read() {
+        let mut job = job();
+        job.heads =
+            vec![InputFile { file: Some("missing.glb".into()), fingerprint: Fingerprint::default() }; 32];
+        let message = job.load_heads().unwrap_err().to_string();
+        assert!(message.contains("found 32 heads, expected at most 31"), "{message}");
     }
 
     #[test]

@@ -85,11 +85,7 @@ const CASES: &[Case] = &[
     case(
         "a quarter of the thickness",
         ["ear", "transmit", "shadow-depth"],
-        [
-            "shade_transmit",
-            "clamp(thickness_mm * params.slab.rgb",
-            "clamp(0.25 * thickness_mm * params.slab.rgb",
-        ],
+        ["shade_transmit", "params.slab, thickness_mm, albedo)", "params.slab, 0.25 * thickness_mm, albedo)"],
     ),
     case(
         "wrinkles of the wrong sign in one of two methods",

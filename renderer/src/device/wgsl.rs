@@ -32,12 +32,13 @@ macro_rules! module {
 pub(crate) use module;
 
 /// Modules that every shader may import.
-const SHARED: [Module; 7] = [
+const SHARED: [Module; 8] = [
     module!("authored", "../shared/authored.wesl"),
     module!("blocks", "../shared/blocks.wesl"),
     module!("math", "../shared/math.wesl"),
     module!("light", "../shared/light.wesl"),
     module!("shadow_map", "../shared/shadow_map.wesl"),
+    module!("slab", "../shared/slab.wesl"),
     module!("surface", "../shared/surface.wesl"),
     module!("view", "../shared/view.wesl"),
 ];

@@ -46,7 +46,7 @@ pub(crate) async fn draw(
     for subsample in frame.subsamples() {
         let seen = frame.see(r, subsample);
         let lit = frame.shade(r, &light, &seen, &samples, None);
-        let integral = Surface::new(r.gpu, &frame.settings.quality.profile, size)?;
+        let integral = Surface::new(r.gpu, &frame.settings.quality, size)?;
         integral.record_normals(r, &seen, &frame.heads);
         let lights = if integral.is_directional() { one_by_one(&light) } else { Vec::new() };
         let lighting = |light| Lighting {

@@ -11,9 +11,10 @@ use crate::passes::geometry::surface_data;
 use crate::passes::hair::Onto;
 use crate::passes::lens::depth_of_field::Behind;
 use crate::passes::shade::{Lighting, Lit, SkinLight};
-use crate::scene::lamp::{Illumination, place_lights};
+use crate::scene::lamp::{Illumination, map_side, place_lights};
 use crate::scene::placement::{average_light, receivers};
 use crate::scene::view::{Seen, View, Window, pixels_per_mm, view, windows};
+use crate::settings::DetailMethod;
 
 /// Results of the samples of a pixel so far.
 #[derive(Default)]
@@ -37,7 +38,12 @@ impl<'a> Frame<'a> {
     pub(crate) fn light(&self, r: &mut Recorder<'_>) -> Illumination<'a> {
         let seen = receivers(self.scene, self.settings.output.size, self.needs.margin, self.needs.backs);
         let (lights, views) = place_lights(self.scene, &self.lamps, &seen);
-        let shadows = self.passes.shadow.record(r, &views, &self.heads, self.settings.quality.shadow_size);
+        let (quality, height) = (&self.settings.quality, self.settings.frame_size()[1]);
+        let side = match quality.detail {
+            DetailMethod::Auto => map_side(self.scene, &views, &seen, height, quality.shadow_size),
+            DetailMethod::Full => quality.shadow_size,
+        };
+        let shadows = self.passes.shadow.record(r, &views, &self.heads, side);
         Illumination {
             lights,
             shadows,

@@ -10,6 +10,7 @@ use super::head::HeadOnGpu;
 use super::placement::world_from_head;
 use super::{HeadInstance, Scene};
 use crate::device::{Gpu, Image, ImageSpec};
+use crate::passes::bounce::Bouncing;
 
 /// Bytes of the tangent frame of a vertex: normal, occlusion, tangent, sign.
 const FRAME_BYTES: u64 = 32;
@@ -34,6 +35,8 @@ pub(crate) struct PosedHead<'a> {
     pub(crate) tangent_frames: &'a wgpu::Buffer,
     /// Light from other places of the head at each point, radiance of a white surface.
     pub(crate) bounced: &'a wgpu::Buffer,
+    /// Buffers between the steps of it.
+    pub(crate) bouncing: &'a Bouncing,
     /// Change of bias, change of scale and neutral mean of hemoglobin.
     pub(crate) blood: &'a Image,
     /// Weight of each wrinkle map, four per layer: an array, whatever its number of layers.
@@ -48,6 +51,7 @@ pub(crate) struct Instance {
     pub(crate) previous_positions: wgpu::Buffer,
     pub(crate) tangent_frames: wgpu::Buffer,
     bounced: wgpu::Buffer,
+    bouncing: Bouncing,
     blood: Image,
     wrinkle_weights: Image,
     hairs: wgpu::Buffer,
@@ -72,6 +76,7 @@ impl Instance {
             previous_positions: gpu.storage_zeroed("previous positions", points),
             tangent_frames: gpu.storage_zeroed("tangent frames", u64::from(head.vertex_count) * FRAME_BYTES),
             bounced: gpu.storage_zeroed("bounced light", points),
+            bouncing: Bouncing::new(gpu, head.point_count),
             blood: Image::new(gpu, "blood", ImageSpec::light(side)),
             wrinkle_weights,
             hairs: gpu.storage_zeroed("hairs", hair_bytes(head)),
@@ -97,7 +102,10 @@ impl Instance {
     pub(crate) fn bytes(&self) -> u64 {
         let buffers =
             [&self.positions, &self.previous_positions, &self.tangent_frames, &self.bounced, &self.hairs];
-        buffers.iter().map(|b| b.size()).sum::<u64>() + self.blood.bytes() + self.wrinkle_weights.bytes()
+        buffers.iter().map(|b| b.size()).sum::<u64>()
+            + self.bouncing.bytes()
+            + self.blood.bytes()
+            + self.wrinkle_weights.bytes()
     }
 }
 
@@ -108,7 +116,12 @@ pub(crate) fn instance_bytes(head: &HeadOnGpu) -> u64 {
         ImageSpec::storage([APPEARANCE_SIZE; 2], wgpu::TextureFormat::Rgba8Unorm).layers(layers(head));
     let points = (u64::from(head.point_count) * 16).max(16);
     let frames = (u64::from(head.vertex_count) * FRAME_BYTES).max(16);
-    3 * points + frames + hair_bytes(head).max(16) + blood.bytes() + weights.bytes()
+    3 * points
+        + Bouncing::bytes_of(head.point_count)
+        + frames
+        + hair_bytes(head).max(16)
+        + blood.bytes()
+        + weights.bytes()
 }
 
 fn hair_bytes(head: &HeadOnGpu) -> u64 {
@@ -139,6 +152,7 @@ pub(crate) fn posed<'a>(
         kept_positions: &buffers.previous_positions,
         tangent_frames: &buffers.tangent_frames,
         bounced: &buffers.bounced,
+        bouncing: &buffers.bouncing,
         blood: &buffers.blood,
         wrinkle_weights: &buffers.wrinkle_weights,
         hairs: &buffers.hairs,

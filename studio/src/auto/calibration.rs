@@ -1,7 +1,8 @@
 //! Estimates of error and cost, fitted to a chart of random shots.
 //!
 //! The error of a choice, as mean FLIP and as relative RMSE, is `d exp(c . f)`: `f` are the logarithm of the millimetres of a pixel, its square, the
-//! logarithms of the share of the picture, of visible relief and of brightness, backlight and contrast; `d` is the weight that drives it
+//! logarithms of the share of the picture, of visible relief, of brightness and of light through thin parts, backlight, contrast and how much the face looks at the
+//! camera; `d` is the weight that drives it
 //! (wrinkles, blood), or 1. Least squares with a small ridge; a margin on top covers 95 % of the shots, each predicted without itself.
 //!
 //! Errors of several choices together, [`Together`]: a share of the sum of their means, and a factor on the root of the sum of squares of their margins, as
@@ -25,7 +26,7 @@ const RIDGE: f64 = 1e-3;
 /// Share of shots that the margin covers.
 const COVERED: f64 = 0.95;
 /// Terms of the model.
-const TERMS: usize = 8;
+const TERMS: usize = 10;
 /// Fewest shots that an estimate rests on.
 const FEWEST_SHOTS: usize = 12;
 
@@ -171,6 +172,15 @@ pub struct Combined {
     pub errors: [f64; 2],
 }
 
+/// Estimates, and those without each shot.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// Of all shots.
+    pub calibration: Calibration,
+    /// For each shot, of the others: what would be chosen in it without knowing it.
+    pub left_out: Vec<Calibration>,
+}
+
 /// Estimates for a device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
@@ -196,7 +206,8 @@ pub struct Calibration {
 fn terms(f: &Features) -> [f64; TERMS] {
     let s = f.mm_per_pixel.max(1e-4).ln();
     let [relief, brightness] = [f.relief.max(1e-3).ln(), f.brightness.max(1e-2).ln()];
-    [1.0, s, s * s, f.share.max(1e-6).ln(), f.backlight, f.contrast, relief, brightness]
+    let through = f.through.max(1e-4).ln();
+    [1.0, s, s * s, f.share.max(1e-6).ln(), f.backlight, f.contrast, relief, brightness, through, f.facing]
 }
 
 /// Least and largest value of each term.
@@ -250,14 +261,13 @@ fn line(points: &[(f64, f64)]) -> [f64; 2] {
 }
 
 impl Calibration {
-    /// Fits a chart of shots whose features are known to their times, in one or more sizes of pictures; none if a group has
-    /// too few shots or no times.
-    pub fn of(
+    /// Estimates of the choices of a chart, without a shot if one is named.
+    fn groups(
         report: &ChartReport,
         features: &[Features],
         times: &[Times],
-        combined: &[Combined],
-    ) -> Option<Self> {
+        without: Option<usize>,
+    ) -> Option<Vec<Group>> {
         let mut groups = Vec::new();
         for (g, group) in report.groups.iter().enumerate() {
             let drive = match group.flag.as_str() {
@@ -270,9 +280,11 @@ impl Calibration {
             let mut choices = Vec::new();
             for (c, choice) in group.choices.iter().enumerate().filter(|(c, _)| is_timed(*c)) {
                 let rows = |of: fn(&ChartError) -> f64| -> Vec<([f64; TERMS], f64)> {
-                    (choice.points.iter().zip(features))
-                        .filter(|(_, f)| f.share > 0.0 && drive.of(f) >= LEAST_DRIVE)
-                        .map(|(p, f)| (terms(f), (of(&p.error) / drive.of(f)).max(LEAST_ERROR).ln()))
+                    (choice.points.iter().zip(features).enumerate())
+                        .filter(|(s, (_, f))| {
+                            without != Some(*s) && f.share > 0.0 && drive.of(f) >= LEAST_DRIVE
+                        })
+                        .map(|(_, (p, f))| (terms(f), (of(&p.error) / drive.of(f)).max(LEAST_ERROR).ln()))
                         .collect()
                 };
                 let is_right = choice.points.iter().all(|p| p.error.flip_mean < LEAST_ERROR);
@@ -293,6 +305,18 @@ impl Calibration {
             }
             groups.push(Group { flag: group.flag.clone(), drive, choices });
         }
+        Some(groups)
+    }
+
+    /// Fits a chart of shots whose features are known to their times, in one or more sizes of pictures; none if a group has
+    /// too few shots or no times.
+    pub fn of(
+        report: &ChartReport,
+        features: &[Features],
+        times: &[Times],
+        combined: &[Combined],
+    ) -> Option<Fitted> {
+        let groups = Self::groups(report, features, times, None)?;
         // A frame of the base, less what its choices cost over the first ones.
         let [g, c] = (report.groups.iter().enumerate()).find_map(|(g, group)| {
             Some([g, group.choices.iter().position(|c| c.settings == report.settings)?])
@@ -307,10 +331,18 @@ impl Calibration {
             flip: Together { share: 1.0, factor: 1.0 },
             relative_rmse: Together { share: 1.0, factor: 1.0 },
         };
+        let mut left_out = (0..features.len())
+            .map(|s| {
+                let groups = Self::groups(report, features, times, Some(s))?;
+                Some(Self { groups, ..calibration.clone() })
+            })
+            .collect::<Option<Vec<Self>>>()?;
+        // How errors add up is asked of estimates that do not know the shot, too.
         let together = |metric: Metric, of: usize| {
             let expected = |c: &Combined| {
                 let parts = c.choices.iter().enumerate();
-                let parts = parts.map(|(g, choice)| calibration.error(metric, g, *choice, &features[c.shot]));
+                let estimates = &left_out[c.shot];
+                let parts = parts.map(|(g, choice)| estimates.error(metric, g, *choice, &features[c.shot]));
                 (parts.collect(), c.errors[of])
             };
             Together::of(&combined.iter().map(expected).collect::<Vec<_>>())
@@ -330,7 +362,10 @@ impl Calibration {
             }
         }
         calibration.base_ms = line(&places);
-        Some(calibration)
+        for other in &mut left_out {
+            *other = Self { groups: std::mem::take(&mut other.groups), ..calibration.clone() };
+        }
+        Some(Fitted { calibration, left_out })
     }
 
     /// With margins by a factor wider.
@@ -426,9 +461,11 @@ mod tests {
             contrast: f64::from(i % 5) / 5.0,
             relief: 0.02 * f64::from(1 + i % 11),
             brightness: 0.05 * f64::from(1 + i % 13),
+            through: 1e-3 * f64::from(1 + i % 17),
+            facing: f64::from(i % 4) / 4.0,
             ..Features::default()
         };
-        let law = [-3.0, -0.5, 0.1, 0.2, 0.7, 0.3, 0.4, 0.6];
+        let law = [-3.0, -0.5, 0.1, 0.2, 0.7, 0.3, 0.4, 0.6, 0.3, -0.2];
         let rows: Vec<_> = (0..40).map(|i| (terms(&features(i)), dot(&law, &terms(&features(i))))).collect();
         let found = fit(&rows).unwrap();
         for (terms, value) in &rows {

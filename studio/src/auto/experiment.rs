@@ -140,7 +140,7 @@ fn measure(
     let Some(mut right) = all.last().cloned() else {
         return Err(Failure::input("there is nothing to choose"));
     };
-    right.quality.scatter = ScatterMethod::Separable(65);
+    right.quality.scatter = ScatterMethod::ReferenceScreen;
     right.quality.antialias = AntialiasMethod::Ssaa(8);
     let truths: Vec<Truth> = scenes
         .iter()

@@ -3,9 +3,10 @@
 use std::f64::consts::PI;
 
 use glam::Vec3;
+use rubor_rig::bvh::Bvh;
 use rubor_rig::deform::point_normals;
 use rubor_rig::evaluate::{LightState, Shot};
-use rubor_rig::head::Head;
+use rubor_rig::head::{Head, Material};
 use serde::{Deserialize, Serialize};
 
 /// Points of a head that stand for its surface.
@@ -20,6 +21,12 @@ const RELIEF_SLOPE: f32 = 0.2;
 const SKIN: Look = Look { albedo: 0.35, head_on: 0.028, roughness: 0.3 };
 /// Linear light that a picture shows as white.
 const WHITE: f64 = 0.55;
+/// Thickness over which light that passes skin falls to 1/e, millimetres: of red through slabs of `docs/light.md`.
+const PASSES_MM: f64 = 3.0;
+/// Thickness from which nothing passes.
+const THICKEST_MM: f32 = 20.0;
+/// Rays into the skin start this far below it, millimetres.
+const START_MM: f32 = 0.05;
 
 /// Numbers of a shot of a head from which errors and costs are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -39,6 +46,10 @@ pub struct Features {
     pub blood: f64,
     /// Mean displayed value of the skin in view, 0 to 1.
     pub brightness: f64,
+    /// How much displayed values change by light through thin parts, in the mean over the skin in view.
+    pub through: f64,
+    /// Cosine of the angle between the way the face looks and the camera, at least 0: wrinkles and blood are in the face.
+    pub facing: f64,
     /// How much displayed values change when the surface tilts by the slope of pores, root mean square: highlights and grazing
     /// light make relief visible, and what is finer than a pixel alias.
     pub relief: f64,
@@ -51,6 +62,17 @@ struct Place {
     normal: Vec3,
     /// Square metres of the surface that it stands for.
     area: f64,
+    /// Share of light from behind that passes the head here.
+    passes: f64,
+}
+
+/// A place in view of the camera, in the world.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    point: Vec3,
+    normal: Vec3,
+    area: f64,
+    passes: f64,
 }
 
 /// A head as features see it.
@@ -75,6 +97,11 @@ struct Arriving {
 impl Look {
     /// Displayed value of a surface with a normal.
     fn displayed(&self, normal: Vec3, to_camera: Vec3, lamps: &[Arriving], around: f64) -> f64 {
+        display(self.light(normal, to_camera, lamps, around))
+    }
+
+    /// Light of it.
+    fn light(&self, normal: Vec3, to_camera: Vec3, lamps: &[Arriving], around: f64) -> f64 {
         let mut light = (self.albedo + self.head_on) * around;
         for lamp in lamps {
             let cos = f64::from(normal.dot(lamp.to_light));
@@ -91,8 +118,13 @@ impl Look {
             let specular = facets * fresnel / f64::from(half.length_squared()).max(0.1);
             light += lamp.irradiance * cos * (self.albedo / PI + specular);
         }
-        (light / WHITE).clamp(0.0, 1.0).powf(1.0 / 2.2)
+        light
     }
+}
+
+/// Displayed value of light.
+fn display(light: f64) -> f64 {
+    (light / WHITE).clamp(0.0, 1.0).powf(1.0 / 2.2)
 }
 
 impl Outline {
@@ -108,7 +140,18 @@ impl Outline {
             points.iter().for_each(|p| areas[*p] += area / 3.0);
         }
         let stride = mesh.points.len().div_ceil(MOST_POINTS).max(1);
-        let place = |i: usize| Place { point: mesh.points[i], normal: normals[i], area: areas[i] };
+        let corners = |t: &[u32; 3]| t.map(|v| mesh.points[mesh.vertices[v as usize].point as usize]);
+        let skin = mesh.parts.iter().filter(|p| p.material == Material::Skin);
+        let surface = Bvh::new(
+            skin.flat_map(|p| p.triangles.clone()).map(|t| corners(&mesh.triangles[t as usize])).collect(),
+        );
+        let passes = |i: usize| {
+            let start = mesh.points[i] - 1e-3 * START_MM * normals[i];
+            let met = surface.first(start, -normals[i], 0.0, 1e-3 * THICKEST_MM, None);
+            met.map_or(0.0, |met| (-1e3 * f64::from(met.distance) / PASSES_MM).exp())
+        };
+        let place =
+            |i: usize| Place { point: mesh.points[i], normal: normals[i], area: areas[i], passes: passes(i) };
         Self { places: (0..mesh.points.len()).step_by(stride).map(place).collect() }
     }
 
@@ -128,7 +171,12 @@ impl Outline {
         let mut middle = Vec3::ZERO;
         for place in &self.places {
             let world = face.head_rotation * place.point + face.head_translation;
-            let surface = (world, face.head_rotation * place.normal, place.area);
+            let surface = Seen {
+                point: world,
+                normal: face.head_rotation * place.normal,
+                area: place.area,
+                passes: place.passes,
+            };
             let from_camera = world - camera.position;
             let depth = f64::from(from_camera.dot(forward));
             if depth <= 1e-4 {
@@ -164,6 +212,8 @@ impl Outline {
         Features {
             brightness,
             relief,
+            through: through(&seen, shot, around),
+            facing: f64::from((face.head_rotation * Vec3::Z).dot(to_camera)).max(0.0),
             mm_per_pixel: 2000.0 * near * half_height / height,
             share: (high[0] - low[0]) * (high[1] - low[1]) / 4.0,
             backlight: if lamps > 0.0 { behind / lamps } else { 0.0 },
@@ -187,23 +237,53 @@ pub fn features_of(outlines: &[&Outline], shots: &[Shot], spacing_m: f32, size: 
     outlines.iter().zip(shots).enumerate().map(of).collect()
 }
 
-/// Mean displayed value of places (point, normal, area) that face the camera, and how much it changes with the slope of relief.
-fn shown(places: &[(Vec3, Vec3, f64)], shot: &Shot, around: f64) -> [f64; 2] {
+impl Seen {
+    /// Direction to the camera, and how much of the picture it covers: 0 where it faces away.
+    fn toward_camera(&self, shot: &Shot) -> (Vec3, f64) {
+        let away = shot.camera.position - self.point;
+        let to_camera = away.normalize_or_zero();
+        let facing = f64::from(self.normal.dot(to_camera)).max(0.0);
+        (to_camera, self.area * facing / f64::from(away.length_squared()).max(1e-6))
+    }
+
+    /// Light of lamps that comes here.
+    fn lamps(&self, shot: &Shot) -> Vec<Arriving> {
+        let lamp = |light: &LightState| {
+            let (to_light, falloff) = toward(light, self.point);
+            Arriving { to_light, irradiance: f64::from(light.power_linear.element_sum() * falloff / 3.0) }
+        };
+        shot.lights.iter().map(lamp).collect()
+    }
+}
+
+/// How much displayed values of places change by light through thin parts, in the mean.
+fn through(places: &[Seen], shot: &Shot, around: f64) -> f64 {
+    let (mut weights, mut changes) = (0.0, 0.0);
+    for place in places {
+        let (to_camera, weight) = place.toward_camera(shot);
+        weights += weight;
+        if weight <= 0.0 || place.passes < 1e-3 {
+            continue;
+        }
+        let lamps = place.lamps(shot);
+        let behind = |lamp: &Arriving| lamp.irradiance * f64::from(-place.normal.dot(lamp.to_light)).max(0.0);
+        let passed = place.passes * lamps.iter().map(behind).sum::<f64>() / PI;
+        let light = SKIN.light(place.normal, to_camera, &lamps, around);
+        changes += weight * (display(light + passed) - display(light));
+    }
+    if weights > 0.0 { changes / weights } else { 0.0 }
+}
+
+/// Mean displayed value of places that face the camera, and how much it changes with the slope of relief.
+fn shown(places: &[Seen], shot: &Shot, around: f64) -> [f64; 2] {
     let stride = places.len().div_ceil(MOST_LIT).max(1);
     let (mut weights, mut values, mut squares) = (0.0, 0.0, 0.0);
-    for &(point, normal, area) in places.iter().step_by(stride) {
-        let away = shot.camera.position - point;
-        let to_camera = away.normalize_or_zero();
-        let weight =
-            area * f64::from(normal.dot(to_camera)).max(0.0) / f64::from(away.length_squared()).max(1e-6);
+    for place in places.iter().step_by(stride) {
+        let (to_camera, weight) = place.toward_camera(shot);
         if weight <= 0.0 {
             continue;
         }
-        let lamp = |light: &LightState| {
-            let (to_light, falloff) = toward(light, point);
-            Arriving { to_light, irradiance: f64::from(light.power_linear.element_sum() * falloff / 3.0) }
-        };
-        let lamps: Vec<Arriving> = shot.lights.iter().map(lamp).collect();
+        let (normal, lamps) = (place.normal, place.lamps(shot));
         let displayed = |normal: Vec3| SKIN.displayed(normal, to_camera, &lamps, around);
         let value = displayed(normal);
         let (along, across) = normal.any_orthonormal_pair();
@@ -254,7 +334,11 @@ mod tests {
         let expected = 2000.0 * 0.95 * 10f64.to_radians().tan() / 100.0;
         assert!((near.mm_per_pixel / expected - 1.0).abs() < 0.08, "{near:?}");
         assert!(far.share < near.share && far.share > 0.0);
-        assert!(near.backlight == 0.0 && of(1.0, -1.0, "").backlight > 0.8);
+        let behind = of(1.0, -1.0, "");
+        assert!(near.backlight == 0.0 && behind.backlight > 0.8);
+        assert!(behind.through > 3.0 * near.through && behind.through > 1e-3, "{near:?} {behind:?}");
+        let turned = of(1.0, 1.0, r#", "head": { "yawDegrees": 60 }"#);
+        assert!(near.facing > 0.98 && (turned.facing - 0.5).abs() < 0.07, "{near:?} {turned:?}");
         assert_eq!(near.contrast, 1.0);
         assert!(of(1.0, 1.0, r#", "environment": { "name": "studio", "intensity": 1 }"#).contrast < 0.6);
         assert_eq!((near.wrinkles, near.blood), (0.0, 0.0));

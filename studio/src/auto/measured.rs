@@ -13,7 +13,7 @@ use rubor_rig::expression::Rig;
 use rubor_rig::head::Head;
 use rubor_rig::random::SplitMix64;
 
-use super::calibration::{Combined, Times};
+use super::calibration::{Combined, Fitted, Times};
 use super::shots::{calibrated, random_shots};
 use super::{Auto, Bound, Calibration, Features, Outline};
 use crate::error::{Failure, Outcome};
@@ -97,10 +97,10 @@ pub fn run(
     }
     let outline = Outline::of(head);
     let features: Vec<_> = scenes.iter().map(|s| outline.features(&s.shot, base.output.size)).collect();
-    let calibration = Calibration::of(&report, &features, &times, &combined)
+    let fitted = Calibration::of(&report, &features, &times, &combined)
         .ok_or_else(|| Failure::job("the shots do not suffice for estimates").hint("more --shots"))?;
     let mut trials = Trials { studio, scenes: &scenes, truths: &truths, base, known };
-    let calibration = trials.kept(calibration, &features, watch)?;
+    let calibration = trials.kept(fitted, &features, watch)?;
     Ok(Measured { calibration, features, report })
 }
 
@@ -152,21 +152,21 @@ impl Trials<'_> {
     }
 
     /// Widens margins until what is chosen under bounds keeps them: the cheapest of many choices is one whose error is estimated too low
-    /// more often than any choice is.
-    fn kept(
-        &mut self,
-        calibration: Calibration,
-        features: &[Features],
-        watch: &mut dyn Watch,
-    ) -> Outcome<Calibration> {
+    /// more often than any choice is. What is chosen in a shot is chosen by estimates that do not know it.
+    fn kept(&mut self, fitted: Fitted, features: &[Features], watch: &mut dyn Watch) -> Outcome<Calibration> {
         let size = self.base.output.size;
-        let mut auto = Auto { bound: Bound::Flip(1.0), held: Vec::new(), calibration };
+        let Fitted { mut calibration, mut left_out } = fitted;
+        let auto = |calibration: &Calibration, most: f64| Auto {
+            bound: Bound::Flip(most),
+            held: Vec::new(),
+            calibration: calibration.clone(),
+        };
         for _ in 0..MOST_TRIALS {
             let (mut chosen, mut kept) = (0usize, 0usize);
             watch.begin("choices under bounds", (TRIED_BOUNDS.len() * self.scenes.len()) as u64);
-            for (shot, f) in features.iter().enumerate() {
+            for (shot, (f, without)) in features.iter().zip(&left_out).enumerate() {
                 for most in TRIED_BOUNDS {
-                    auto.bound = Bound::Flip(most);
+                    let auto = auto(without, most);
                     let found = auto.choose(&[*f], size, None);
                     let choices: Vec<usize> = found.choices.iter().filter_map(|c| *c).collect();
                     if found.is_kept {
@@ -181,13 +181,15 @@ impl Trials<'_> {
             if kept as f64 >= KEPT * chosen as f64 {
                 break;
             }
-            auto.calibration = auto.calibration.widened(WIDER);
+            calibration = calibration.widened(WIDER);
+            left_out = left_out.into_iter().map(|c| c.widened(WIDER)).collect();
         }
-        Ok(auto.calibration)
+        Ok(calibration)
     }
 }
 
-/// What combinations of choices are compared with: the last choice of each, and more taps and samples than any of them.
+/// What combinations of choices are compared with: the last choice of each, the integral over the screen that the chart compares with, and more samples than any
+/// of them.
 pub(super) fn full_quality(base: &Settings) -> Outcome<Settings> {
     let mut right = base.clone();
     for (flag, values) in calibrated()? {
@@ -195,7 +197,7 @@ pub(super) fn full_quality(base: &Settings) -> Outcome<Settings> {
             right.overlay(&leaf.change(value))?;
         }
     }
-    right.quality.scatter = ScatterMethod::Separable(65);
+    right.quality.scatter = ScatterMethod::ReferenceScreen;
     right.quality.antialias = AntialiasMethod::Ssaa(8);
     Ok(right)
 }

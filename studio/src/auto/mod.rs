@@ -376,6 +376,8 @@ mod tests {
         blood: 0.0,
         brightness: 0.4,
         relief: 0.05,
+        through: 0.002,
+        facing: 0.9,
     };
 
     #[test]

@@ -23,6 +23,7 @@ pub const CALIBRATED: &[(&str, &[&str])] = &[
     ("color", &["static", "hemoglobin"]),
     ("antialias", &["none", "smaa-1x", "smaa-s2x", "ssaa:2", "ssaa:4"]),
     ("shadow-size", &["512", "1024", "2048"]),
+    ("bounce", &["none", "patches"]),
 ];
 
 /// Seed of shots that estimates are judged in.

@@ -137,6 +137,7 @@ impl Contents {
                 (job, heads)
             }
             None => {
+                inputs::check_number_of_heads(self.head.len())?;
                 let heads: Vec<LoadedHead> = match &self.head[..] {
                     [] => vec![inputs::head(None)?],
                     files => files.iter().map(|path| inputs::head(Some(path))).collect::<Outcome<_>>()?,

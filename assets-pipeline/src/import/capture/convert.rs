@@ -71,12 +71,13 @@ pub fn to_sequence(
     }
     // A take of n samples at the sequence's rate has n frames although its times may be rounded to milliseconds.
     let slack = (ROUNDING_S * fps).clamp(1e-3, 0.5);
-    let count = (recording.length_s() * fps + slack).floor() as usize + 1;
-    if count > MOST_SAMPLES {
+    let count = (recording.length_s() * fps + slack).floor() + 1.0;
+    if count > MOST_SAMPLES as f64 {
         let gap = times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let found = format!("{count} frames at {fps} a second, samples up to {gap:.1} s apart");
         return Err(wrong("length", found, &format!("at most {MOST_SAMPLES} frames")));
     }
+    let count = count as usize;
     let mut report = Report {
         samples: times.len(),
         rate,

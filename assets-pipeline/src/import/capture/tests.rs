@@ -430,3 +430,16 @@ fn a_minute_at_60_frames_a_second_takes_less_than_a_second() {
     // A machine under load may take a while; the requirement is a second on an idle one.
     assert!(took.as_secs_f64() < 1.0, "{took:?}");
 }
+
+/// Found by fuzzing: more frames than a number of them holds.
+#[test]
+fn a_recording_of_more_than_all_time_is_refused() {
+    let huge = "1844674407370955161518446744073709551615";
+    for times in [vec!["10.0", huge], vec![huge, "10.0", "1e300"]] {
+        let rows = times.iter().map(|t| format!("{t}\t0.2\n")).collect::<String>();
+        let text = format!("Timecode\tJawOpen\n{rows}");
+        let recording = live_link::from_bytes(text.as_bytes(), Path::new("x.csv"), None).unwrap();
+        let error = to_sequence(&recording, &Retarget::default(), Some(24.0)).unwrap_err().to_string();
+        assert!(error.contains("frames at 24 a second"), "{error}");
+    }
+}

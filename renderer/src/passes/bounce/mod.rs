@@ -1,8 +1,8 @@
 //! Light that the head sends to itself: the neck lights the chin, one wall of a cavity the other.
 //!
 //! ```text
-//! lamps, shadows, sky --emit--> radiance, albedo of each point --average--> radiance of each patch
-//!        --gather--> light of one bounce on each point --average, gather--> of all bounces --smooth, smooth--> bounced
+//! lamps, shadows, sky --emit--> radiance of each patch --send_on--> what patches send on of that
+//!        --gather--> light of all bounces on each point --smooth--> bounced
 //! ```
 //!
 //! Theory: radiosity (Goral et al. 1984) by what rays of each point meet at rest ([`rubor_rig::exchange`]). Eight points of each patch are lit as
@@ -22,13 +22,15 @@
 //! Does not: carry highlights, light through thin parts, light between heads, or from parts that are seen through. Parts with the
 //! material of their author count as a grey of 0.2. The light of eyes is that without lids.
 //!
-//! Cost: seven dispatches over points; `docs/light.md` has the time.
+//! Cost: four dispatches, all heads in each; `docs/light.md` has the time. What takes long on a graphics card is not the work but one point after
+//! the other and one lamp after the other: so four invocations share a point.
 
 #[cfg(test)]
 mod tests;
 
-use rubor_rig::exchange::{Exchange, RAYS};
+use rubor_rig::exchange::{Exchange, MOST_PATCHES, RAYS};
 
+use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
 use crate::device::{Bind, Gpu, Kernel, Recorder};
 use crate::passes::shade::{self, Lighting, Shade};
@@ -39,14 +41,14 @@ const EMIT: Module = module!("bounce_emit", "emit.wesl");
 const BOUNCE: Module = module!("bounce", "bounce.wesl");
 const SMOOTH: Module = module!("bounce_smooth", "smooth.wesl");
 
-/// The shader that lights points.
-pub(crate) fn emit_program() -> Program {
-    shade::importing(EMIT, None)
+/// The shader that lights points; with `shares_lamps` four invocations share those of a point.
+pub(crate) fn emit_program(shares_lamps: bool) -> Program {
+    shade::importing(EMIT, Some("points")).flag("shared_lamps", shares_lamps).constant("EMITTERS", EMITTERS)
 }
 
-/// The shader that sends light from patches to points; `again` for the second round.
-pub(crate) fn bounce_program(again: bool) -> Program {
-    Program::new(BOUNCE).flag("again", again)
+/// The shader that sends light from patches to points.
+pub(crate) fn bounce_program() -> Program {
+    Program::new(BOUNCE).constant("EMITTERS", EMITTERS)
 }
 
 /// The shader that smooths over neighbours.
@@ -54,22 +56,20 @@ pub(crate) fn smooth_program() -> Program {
     Program::new(SMOOTH)
 }
 
+/// Points that stand for a patch, at most: every point of it would cost more and look the same.
+const EMITTERS: u32 = 8;
+/// In place of a point where a patch has fewer.
+const NO_POINT: u32 = u32::MAX;
+
 /// What the points of a head see of it, on the device.
 pub(crate) struct Ways {
+    /// [`EMITTERS`] of each patch.
     emitters: wgpu::Buffer,
-    patch_starts: wgpu::Buffer,
-    patch_points: wgpu::Buffer,
     ways: wgpu::Buffer,
-    patches: wgpu::Buffer,
-    emitted: wgpu::Buffer,
-    /// Light on points, in turn.
-    arrived: [wgpu::Buffer; 2],
+    neighbour_starts: wgpu::Buffer,
+    neighbours: wgpu::Buffer,
     patch_count: u32,
-    emitter_count: u32,
 }
-
-/// Points that stand for a patch, at most: every point of it would cost more and look the same.
-const MOST_EMITTERS: usize = 8;
 
 impl Ways {
     /// Traces rays from the points of a surface at rest, whose ambient visibility is known.
@@ -86,66 +86,135 @@ impl Ways {
         }
         let words: Vec<u32> =
             exchange.seen.chunks_exact(2).map(|w| u32::from(w[0]) | u32::from(w[1]) << 16).collect();
-        const { assert!(RAYS == 32, "bounce.wesl reads four vectors of eight") };
-        let (mut patch_starts, mut patch_points) = (vec![0], Vec::new());
+        const { assert!(RAYS == 32, "bounce.wesl has four invocations read eight each") };
+        let mut emitters: Vec<[u32; 2]> = Vec::new();
         for range in exchange.patch_starts.windows(2) {
             let of_patch = &exchange.patch_points[range[0] as usize..range[1] as usize];
-            patch_points.extend(of_patch.iter().step_by(of_patch.len().div_ceil(MOST_EMITTERS)).copied());
-            patch_starts.push(patch_points.len() as u32);
+            let step = of_patch.len().div_ceil(EMITTERS as usize).max(1);
+            let mut chosen = of_patch.iter().step_by(step).map(|p| [*p, corner_of_point[*p as usize]]);
+            emitters.extend((0..EMITTERS).map(|_| chosen.next().unwrap_or([NO_POINT, 0])));
         }
-        let emitters: Vec<[u32; 2]> =
-            patch_points.iter().map(|p| [*p, corner_of_point[*p as usize]]).collect();
-        let points = 16 * surface.points.len() as u64;
+        let (neighbour_starts, neighbours) = smoothing(surface.points.len(), &triangles);
         Self {
-            emitter_count: emitters.len() as u32,
             emitters: gpu.storage("emitting points", &emitters),
-            patch_starts: gpu.storage("patch starts", &patch_starts),
-            patch_points: gpu.storage("points of patches", &patch_points),
             ways: gpu.storage("ways of light", &words),
-            patches: gpu.storage_zeroed("patches", 16 * exchange.patches() as u64),
-            emitted: gpu.storage_zeroed("emitted light", points),
-            arrived: ["light on points", "light on points, other"].map(|l| gpu.storage_zeroed(l, points)),
+            neighbour_starts: gpu.storage("neighbour starts", &neighbour_starts),
+            neighbours: gpu.storage("neighbours", &neighbours),
             patch_count: exchange.patches() as u32,
         }
     }
 
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
-        let [a, b] = &self.arrived;
-        let buffers = [
-            &self.emitters,
-            &self.patch_starts,
-            &self.patch_points,
-            &self.ways,
-            &self.patches,
-            &self.emitted,
-            a,
-            b,
-        ];
+        let buffers = [&self.emitters, &self.ways, &self.neighbour_starts, &self.neighbours];
         buffers.into_iter().map(|b| b.size()).sum()
+    }
+}
+
+/// First neighbour of each point, and their number; points and the bits of their weights. Weights are those of two rounds in which a point takes the mean over the
+/// corners of its triangles.
+fn smoothing(points: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u32; 2]>) {
+    let mut around: Vec<Vec<(u32, f32)>> = vec![Vec::new(); points];
+    for t in triangles {
+        for p in t {
+            t.iter().for_each(|q| add(&mut around[*p as usize], *q, 1.0));
+        }
+    }
+    for (p, row) in around.iter_mut().enumerate() {
+        let sum: f32 = row.iter().map(|(_, w)| w).sum();
+        row.iter_mut().for_each(|(_, w)| *w /= sum);
+        if row.is_empty() {
+            row.push((p as u32, 1.0));
+        }
+    }
+    let (mut starts, mut neighbours) = (vec![0], Vec::new());
+    for row in &around {
+        let mut twice = Vec::new();
+        for (q, weight) in row {
+            around[*q as usize].iter().for_each(|(r, w)| add(&mut twice, *r, weight * w));
+        }
+        neighbours.extend(twice.into_iter().map(|(p, w)| [p, w.to_bits()]));
+        starts.push(neighbours.len() as u32);
+    }
+    (starts, neighbours)
+}
+
+fn add(row: &mut Vec<(u32, f32)>, point: u32, weight: f32) {
+    match row.iter_mut().find(|(p, _)| *p == point) {
+        Some((_, sum)) => *sum += weight,
+        None => row.push((point, weight)),
+    }
+}
+
+/// The buffers between the steps of a head.
+pub(crate) struct Bouncing {
+    /// Of emitters, 8 bits each.
+    albedos: wgpu::Buffer,
+    /// Radiance of patches.
+    sent: wgpu::Buffer,
+    sent_on: wgpu::Buffer,
+    /// Light on points before it is smoothed.
+    arrived: wgpu::Buffer,
+}
+
+const MOST: u64 = MOST_PATCHES as u64;
+
+impl Bouncing {
+    /// For a head of so many points.
+    pub(crate) fn new(gpu: &Gpu, points: u32) -> Self {
+        Self {
+            albedos: gpu.storage_zeroed("albedos of emitters", 4 * u64::from(EMITTERS) * MOST),
+            sent: gpu.storage_zeroed("light of patches", 16 * MOST),
+            sent_on: gpu.storage_zeroed("light that patches send on", 16 * MOST),
+            arrived: gpu.storage_zeroed("light on points", 16 * u64::from(points)),
+        }
+    }
+
+    /// Bytes that [`Bouncing::new`] takes.
+    pub(crate) fn bytes_of(points: u32) -> u64 {
+        (4 * u64::from(EMITTERS) + 32) * MOST + (16 * u64::from(points)).max(16)
+    }
+
+    /// Bytes on the device.
+    pub(crate) fn bytes(&self) -> u64 {
+        [&self.albedos, &self.sent, &self.sent_on, &self.arrived].into_iter().map(|b| b.size()).sum()
     }
 }
 
 /// The pipelines of the pass.
 pub(crate) struct Bounce {
     emit: Kernel,
-    /// For each round.
-    average: [Kernel; 2],
-    gather: [Kernel; 2],
+    send_on: Kernel,
+    gather: Kernel,
     smooth: Kernel,
+    emitters_of_group: u32,
 }
+
+/// What a head binds while patches send light to points.
+fn between<'a>(head: &PosedHead<'a>, ways: &'a Ways) -> Vec<Resource<'a>> {
+    vec![
+        ("ways", ways.ways.bound()),
+        ("rest", head.head.rest.bound()),
+        ("positions", head.positions.bound()),
+        ("sent", head.bouncing.sent.bound()),
+    ]
+}
+
+/// Invocations of a workgroup, and those that share a point.
+const THREADS: u32 = 64;
+const SHARES: u32 = 4;
 
 impl Bounce {
     /// `stored_shadows` if shadow maps are floats and no depth textures.
     pub(crate) fn new(gpu: &Gpu, stored_shadows: bool) -> Self {
-        let round = |entry: &'static str| {
-            [false, true].map(|again| Kernel::new(gpu, "bounce", &bounce_program(again), entry))
-        };
+        let shares_lamps = !gpu.is_software();
+        let emit = emit_program(shares_lamps).flag("stored_shadows", stored_shadows);
         Self {
-            emit: Kernel::new(gpu, "bounce", &emit_program().flag("stored_shadows", stored_shadows), "emit"),
-            average: round("average"),
-            gather: round("gather"),
-            smooth: Kernel::new(gpu, "bounce", &smooth_program(), "smooth_light"),
+            emit: Kernel::new(gpu, "bounce emit", &emit, "emit"),
+            send_on: Kernel::new(gpu, "bounce send on", &bounce_program(), "send_on"),
+            gather: Kernel::new(gpu, "bounce gather", &bounce_program(), "gather"),
+            smooth: Kernel::new(gpu, "bounce smooth", &smooth_program(), "smooth_light"),
+            emitters_of_group: if shares_lamps { THREADS / SHARES } else { THREADS },
         }
     }
 
@@ -157,51 +226,57 @@ impl Bounce {
         lighting: &Lighting<'_>,
         heads: &[PosedHead<'_>],
     ) {
-        for head in heads {
-            let ways = head.head.ways(r.gpu);
-            if ways.patch_count == 0 {
-                continue;
-            }
-            // Cavities have no guess of the light that this finds.
-            let mut params = shade::params(lighting, head);
-            params.skin_flags |= shade::BOUNCES;
-            let params = r.uniform("bounce", &params);
-            let points = [head.head.point_count.div_ceil(64), 1, 1];
-            let mut resources = shade.resources(lighting, head, &params);
+        let heads: Vec<_> = heads
+            .iter()
+            .map(|h| (h, h.head.ways(r.gpu)))
+            .filter(|(_, ways)| ways.patch_count > 0)
+            .map(|(head, ways)| {
+                // Cavities have no guess of the light that this finds.
+                let mut params = shade::params(lighting, head);
+                params.skin_flags |= shade::BOUNCES;
+                (head, ways, r.uniform("bounce", &params))
+            })
+            .collect();
+        let groups = |n: u32, each: u32| [n.div_ceil(each), 1, 1];
+        let lamps = heads.iter().map(|(head, ways, params)| {
+            let mut resources = shade.resources(lighting, head, params);
             resources.extend([
                 ("emitters", ways.emitters.bound()),
-                ("emitted", ways.emitted.bound()),
+                ("albedos", head.bouncing.albedos.bound()),
+                ("sent", head.bouncing.sent.bound()),
                 ("depth", lighting.seen.depth.bound()),
             ]);
-            r.dispatch(&self.emit, &resources, [ways.emitter_count.div_ceil(64), 1, 1]);
-            let [first, second] = &ways.arrived;
-            for round in 0..2 {
-                let (from, to) = if round == 0 { (second, first) } else { (first, second) };
-                let all = [
-                    ("arrived", from.bound()),
-                    ("arrived_out", to.bound()),
-                    ("emitted", ways.emitted.bound()),
-                    ("patch_starts", ways.patch_starts.bound()),
-                    ("patch_points", ways.patch_points.bound()),
-                    ("ways", ways.ways.bound()),
-                    ("rest", head.head.rest.bound()),
-                    ("positions", head.positions.bound()),
-                    ("patches", ways.patches.bound()),
-                ];
-                r.dispatch(&self.average[round], &all, [ways.patch_count, 1, 1]);
-                r.dispatch(&self.gather[round], &all, points);
-            }
-            for (from, to) in [(second, first), (first, head.bounced)] {
-                let all = vec![
-                    ("arrived", from.bound()),
-                    ("arrived_out", to.bound()),
-                    ("vertices", head.head.vertices.bound()),
-                    ("triangles", head.head.triangles.bound()),
-                    ("ring_starts", head.head.ring_starts.bound()),
-                    ("ring", head.head.ring.bound()),
-                ];
-                r.dispatch(&self.smooth, &all, points);
-            }
-        }
+            (resources, groups(EMITTERS * ways.patch_count, self.emitters_of_group))
+        });
+        r.dispatch_each(&self.emit, lamps);
+        let on = heads.iter().map(|(head, ways, _)| {
+            let mut resources = between(head, ways);
+            resources.extend([
+                ("emitters", ways.emitters.bound()),
+                ("albedos", head.bouncing.albedos.bound()),
+                ("sent_on_out", head.bouncing.sent_on.bound()),
+            ]);
+            (resources, groups(SHARES * EMITTERS * ways.patch_count, THREADS))
+        });
+        r.dispatch_each(&self.send_on, on);
+        let gathered = heads.iter().map(|(head, ways, _)| {
+            let mut resources = between(head, ways);
+            resources.extend([
+                ("sent_on", head.bouncing.sent_on.bound()),
+                ("arrived_out", head.bouncing.arrived.bound()),
+            ]);
+            (resources, groups(SHARES * head.head.point_count, THREADS))
+        });
+        r.dispatch_each(&self.gather, gathered);
+        let smoothed = heads.iter().map(|(head, ways, _)| {
+            let resources = vec![
+                ("neighbour_starts", ways.neighbour_starts.bound()),
+                ("neighbours", ways.neighbours.bound()),
+                ("arrived", head.bouncing.arrived.bound()),
+                ("arrived_out", head.bounced.bound()),
+            ];
+            (resources, groups(SHARES * head.head.point_count, THREADS))
+        });
+        r.dispatch_each(&self.smooth, smoothed);
     }
 }

@@ -237,11 +237,11 @@ pub(crate) struct Params {
 
 /// Light through slabs of skin, as a texture and with the lengths of a profile.
 pub(crate) struct Transmittance {
-    slabs: wgpu::TextureView,
+    pub(crate) slabs: wgpu::TextureView,
     thickness_max_mm: f32,
     ring_taps_mm: [f32; RINGS],
     ring_ends_mm: [f32; RINGS],
-    slab: [f32; 4],
+    pub(crate) slab: [f32; 4],
 }
 
 /// Albedo of a medium by which rings and the farthest thickness are laid out: that of red in light skin.

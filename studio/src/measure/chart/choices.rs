@@ -91,8 +91,8 @@ fn truth(flag: &str, base: &Settings, effort: Effort) -> Option<(Measure, Settin
     match (flag, effort.light) {
         ("scatter" | "transmit" | "curvature", RightLight::Surface(batches)) => {
             quality.scatter = ScatterMethod::ReferenceSurface(batches);
-            // The integral over the surface includes the light from behind.
-            quality.transmit = TransmitMethod::None;
+            // The integral over the surface includes the light from behind: that of slabs.
+            quality.transmit = TransmitMethod::ShadowDepth;
             return Some((Measure::Light, right));
         }
         ("scatter" | "curvature", RightLight::Screen) => quality.scatter = ScatterMethod::ReferenceScreen,

@@ -274,21 +274,26 @@ fn shaders_and_structs_are_what_both_sides_count_on() {
             &offsets!(gather::Tap; place as "place", weight as "weight"),
         );
     }
-    for directional in [false, true] {
-        assert_workgroups(&surface::program(directional), &[("gather", [8, 8, 1]), ("finish", [8, 8, 1])]);
+    for (directional, slab) in [(false, false), (true, false), (false, true)] {
+        assert_workgroups(
+            &surface::program(directional, slab),
+            &[("gather", [8, 8, 1]), ("finish", [8, 8, 1])],
+        );
     }
     assert_workgroups(&surface::normals_program(), &[("pixel_normals", [8, 8, 1])]);
     assert_layout(
-        &surface::program(true),
+        &surface::program(true, false),
         "gather",
         "Params",
         size_of::<surface::Params>(),
         &offsets!(surface::Params; origin as "origin", head as "head", cells as "cells", cell_mm as "cell_mm",
             half_width_mm as "half_width_mm", near_mm as "near_mm", sample_mm2 as "sample_mm2",
             batches as "batches", near_light as "near_light", lamp as "lamp", light_index as "light_index",
-            light_count as "light_count", dipole as "dipole", near_by_cosine as "near_by_cosine"),
+            light_count as "light_count", slab as "slab", dipole as "dipole", near_by_cosine as "near_by_cosine"),
     );
-    for (program, entry) in [(surface::program(false), "gather"), (samples_program(false), "light_samples")] {
+    for (program, entry) in
+        [(surface::program(false, false), "gather"), (samples_program(false), "light_samples")]
+    {
         assert_layout(
             &program,
             entry,

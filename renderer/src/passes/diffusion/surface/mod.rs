@@ -16,6 +16,10 @@
 //! gathered by itself; the sky's light has no direction and takes the mean. Within the radius where the surface counts as flat
 //! the light is that of a disk at the lamp's incidence.
 //!
+//! A profile is that of a half space, and a thin part passes more than it brings to that depth. Frames with `--transmit shadow-depth` therefore
+//! scale what comes from samples behind the surface (whose normal looks away) by what a slab of that depth passes over what the profile
+//! brings there: an evenly lit plane behind a slab gives exactly the slab's light. With other transmittance the profile holds everywhere.
+//!
 //! The error falls at least as 1 / sqrt(N); it is estimated from the spread of the batches.
 //!
 //! Does not: see skin outside of the picture's frame by more than the kernel, average light over a pixel.
@@ -25,7 +29,7 @@ use std::sync::OnceLock;
 use glam::{Mat4, Vec3};
 use rubor_rig::head::Material;
 use rubor_rig::random::SplitMix64;
-use rubor_rig::skin::profile::Profile;
+use rubor_rig::skin::profile::{Profile, RadialProfile};
 
 use crate::device::readback::Readback;
 use crate::device::wgsl::{Module, Program, module};
@@ -34,10 +38,11 @@ use crate::error::RenderError;
 use crate::passes::diffusion::Needs;
 use crate::passes::diffusion::bssrdf::{BSSRDF, Dipole};
 use crate::passes::pixel_groups;
-use crate::passes::shade::Lit;
+use crate::passes::shade::{Lit, Transmittance};
 use crate::scene::PosedHead;
 use crate::scene::lamp::GpuLight;
 use crate::scene::view::Seen;
+use crate::settings::{Quality, TransmitMethod};
 
 #[cfg(test)]
 mod tests;
@@ -65,9 +70,20 @@ const NORMALS: Module = module!("surface_normals", "normals.wesl");
 /// Intervals of the cosine of incidence in `Params::near_by_cosine`.
 const COSINES: usize = 32;
 
-/// The shader of the passes.
-pub(crate) fn program(directional: bool) -> Program {
-    Program::new(SHADER).with(&[BSSRDF]).flag("directional", directional)
+/// The shader of the passes, for a profile or a BSSRDF that knows the direction of light, or for a profile and slabs.
+pub(crate) fn program(directional: bool, slab: bool) -> Program {
+    let program = Program::new(SHADER).with(&[BSSRDF]).flag("directional", directional);
+    program.flag("slab", slab).flag("with_normals", directional || slab)
+}
+
+/// Whether light through thin parts is that of slabs: a BSSRDF that knows the direction of light has its own.
+fn takes_slabs(quality: &Quality) -> bool {
+    quality.transmit == TransmitMethod::ShadowDepth && quality.profile.directional().is_none()
+}
+
+/// Whether light of samples has to come with their normals.
+pub(crate) fn needs_normals(quality: &Quality) -> bool {
+    takes_slabs(quality) || quality.profile.directional().is_some()
 }
 
 /// The shader of the normals.
@@ -98,6 +114,7 @@ pub(crate) struct Params {
     pub(crate) light_index: u32,
     pub(crate) light_count: u32,
     pub(crate) padding: [u32; 2],
+    pub(crate) slab: [f32; 4],
     pub(crate) dipole: Dipole,
     pub(crate) near_by_cosine: [[f32; 4]; COSINES + 1],
 }
@@ -241,6 +258,17 @@ impl Skin {
     }
 }
 
+/// Share of the light of a profile beyond the radii of its table.
+fn beyond(profile: &Profile, half_width_mm: f64) -> Vec<[f32; 4]> {
+    let of = |i: usize| {
+        let x = i as f64 / (ENTRIES - 1) as f64;
+        let light = |c: &RadialProfile| (c.mass_beyond(half_width_mm * x * x) / c.total()) as f32;
+        let [r, g, b] = profile.channels.each_ref().map(light);
+        [r, g, b, 0.0]
+    };
+    (0..ENTRIES).map(of).collect()
+}
+
 /// The passes and sums of one sample of a frame.
 pub(crate) struct Surface {
     gather: Kernel,
@@ -249,6 +277,10 @@ pub(crate) struct Surface {
     half_width_mm: f64,
     near_light: [f32; 4],
     directional: Option<Directional>,
+    /// Light of the profile beyond radii, and slabs, where thin parts pass what slabs do.
+    slabs: Option<(wgpu::Buffer, Transmittance)>,
+    clamped: wgpu::Sampler,
+    normals: OnceLock<Image>,
     sums: wgpu::Buffer,
     squares: wgpu::Buffer,
 }
@@ -259,15 +291,15 @@ struct Directional {
     near_by_cosine: [[f32; 4]; COSINES + 1],
     /// Sums of a batch over its lights so far.
     batch_sums: wgpu::Buffer,
-    normals: OnceLock<Image>,
 }
 
 impl Surface {
-    /// The passes for a profile and a picture.
+    /// The passes for the profile of a quality and a picture.
     ///
     /// # Errors
     /// A directional dipole whose channels refract differently.
-    pub(crate) fn new(gpu: &Gpu, profile: &Profile, size: [u32; 2]) -> Result<Self, RenderError> {
+    pub(crate) fn new(gpu: &Gpu, quality: &Quality, size: [u32; 2]) -> Result<Self, RenderError> {
+        let profile: &Profile = &quality.profile;
         let half_width_mm = profile.channels.iter().map(|c| c.sample_radius(COVERAGE)).fold(0.0, f64::max);
         let near_mm = NEAR_MM.min(half_width_mm);
         let total = profile.total();
@@ -291,13 +323,27 @@ impl Surface {
                 [inside(0), inside(1), inside(2), 0.0]
             }),
             batch_sums: gpu.storage_zeroed("sums of a batch", 16 * pixels),
-            normals: OnceLock::new(),
         });
-        let program = program(directional.is_some());
+        let slabs = match takes_slabs(quality) {
+            true => Some((
+                gpu.storage("light beyond", &beyond(profile, half_width_mm)),
+                Transmittance::new(gpu, profile)?,
+            )),
+            false => None,
+        };
+        let program = program(directional.is_some(), slabs.is_some());
         Ok(Self {
             gather: Kernel::new(gpu, "reference-surface", &program, "gather"),
             finish: Kernel::new(gpu, "reference-surface", &program, "finish"),
             directional,
+            slabs,
+            clamped: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("linear clamp"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            }),
+            normals: OnceLock::new(),
             profile: gpu.storage("profile", &table),
             half_width_mm,
             near_light: [near[0], near[1], near[2], 0.0],
@@ -311,9 +357,16 @@ impl Surface {
         self.directional.is_some()
     }
 
-    /// Finds the normals of pixels, which a directional BSSRDF needs before the first batch.
+    /// Whether light of samples comes with their normals.
+    pub(crate) fn has_normals(&self) -> bool {
+        self.directional.is_some() || self.slabs.is_some()
+    }
+
+    /// Finds the normals of pixels, which slabs and a directional BSSRDF need before the first batch.
     pub(crate) fn record_normals(&self, r: &mut Recorder<'_>, seen: &Seen, heads: &[PosedHead<'_>]) {
-        let Some(directional) = &self.directional else { return };
+        if !self.has_normals() {
+            return;
+        }
         let kernel = Kernel::new(r.gpu, "reference-surface", &normals_program(), "pixel_normals");
         let normals = r.image("normals", ImageSpec::light(seen.ids.size()));
         let numbers: Vec<_> = heads.iter().map(|h| r.uniform("head", &[h.index, 0, 0, 0])).collect();
@@ -331,7 +384,7 @@ impl Surface {
             (resources, pixel_groups(seen.ids.size()))
         });
         r.dispatch_each(&kernel, each);
-        let _ = directional.normals.set(normals);
+        let _ = self.normals.set(normals);
     }
 
     /// Adds batch number `batch` of one head. `light` records the pass that finds the light of samples.
@@ -362,12 +415,13 @@ impl Surface {
             light_index: part.index[0],
             light_count: part.index[1],
             padding: [0; 2],
+            slab: self.slabs.as_ref().map_or([0.0; 4], |(_, slabs)| slabs.slab),
             dipole: self.directional.as_ref().map_or(bytemuck::Zeroable::zeroed(), |d| d.dipole),
             near_by_cosine: self.directional.as_ref().map_or([[0.0; 4]; COSINES + 1], |d| d.near_by_cosine),
         };
         let params = r.uniform("reference-surface", &params);
         let samples = r.gpu.storage("surface samples", &samples);
-        let lights = if self.directional.is_some() { 2 } else { 1 };
+        let lights = if self.has_normals() { 2 } else { 1 };
         let sample_light = r.gpu.storage_zeroed("sample light", lights * 16 * BATCH as u64);
         let starts = r.gpu.storage("cell starts", &starts);
         light(r, &samples, &sample_light);
@@ -387,7 +441,14 @@ impl Surface {
         ];
         if let Some(directional) = &self.directional {
             resources.push(("batch_sums", directional.batch_sums.bound()));
-            resources.extend(directional.normals.get().map(|n| ("normals", n.bound())));
+        }
+        resources.extend(self.normals.get().map(|n| ("normals", n.bound())));
+        if let Some((beyond, slabs)) = &self.slabs {
+            resources.extend([
+                ("beyond", beyond.bound()),
+                ("slabs", slabs.slabs.bound()),
+                ("linear_clamp", self.clamped.bound()),
+            ]);
         }
         r.dispatch(&self.gather, &resources, pixel_groups(seen.ids.size()));
     }

@@ -292,6 +292,54 @@ fn a_wedge_lit_from_behind_passes_what_slabs_do() {
     assert!(dark.iter().all(|p| p[..3] == [0.0; 3]));
 }
 
+/// The integral over the surface passes what slabs do where `--transmit shadow-depth` does, and what the profile brings elsewhere.
+#[test]
+fn the_integral_over_a_wedge_passes_what_slabs_do() {
+    let light = || Light {
+        kind: LightKind::Directional { direction: Vec3::Z },
+        color_linear: Vec3::splat(100.0),
+        radius: 0.0,
+        casts_shadow: true,
+    };
+    let profile = Profile::deon_six();
+    let pixels = 20usize;
+    for transmit in [TransmitMethod::ShadowDepth, TransmitMethod::None] {
+        let method = ScatterMethod::ReferenceSurface(8);
+        let Some((found, _)) = draw(&wedge(), light(), 100.0, pixels as u32, method, transmit) else {
+            return;
+        };
+        let mut compared = 0;
+        for column in 0..pixels {
+            let thickness = (place(column, pixels, 100.0)[0] + 50.0) * SLOPE;
+            if !(1.0..6.0).contains(&thickness) {
+                continue;
+            }
+            let rows: Vec<_> = (3..pixels - 3).map(|row| found[row * pixels + column]).collect();
+            for (c, channel) in profile.channels.iter().enumerate() {
+                let came = rows.iter().map(|p| f64::from(p[c])).sum::<f64>() / rows.len() as f64;
+                let cosine = 1.0 / SLOPE.hypot(1.0);
+                let passes = match transmit {
+                    // For a surface whose albedo of 0.5 is multiplied in later.
+                    TransmitMethod::ShadowDepth => {
+                        SlabTable::kept().sample(0.5, thickness / channel.mean_radius_mm()) / 0.5
+                    }
+                    _ => channel.mass_beyond(thickness) / channel.total(),
+                };
+                let expected =
+                    100.0 / std::f64::consts::PI * cosine * entering(0.6, 0.32, cosine as f32) * passes;
+                // The back is tilted, so what comes from its thinner side weighs more than what comes from the other.
+                let bound = 0.08 * expected + 100.0 / std::f64::consts::PI / 1000.0;
+                assert!(
+                    (came - expected).abs() < bound,
+                    "{transmit}, {thickness} mm, channel {c}: {came} not {expected}"
+                );
+                compared += 1;
+            }
+        }
+        assert!(compared >= 24, "{compared}");
+    }
+}
+
 #[test]
 fn only_skin_scatters() {
     // Strips side by side, one of each opaque material.

@@ -38,8 +38,8 @@ const LARGE_CAPACITY: u32 = 131_072;
 /// Workgroups that share the large triangles of a head.
 const LARGE_GROUPS: u32 = 8192;
 
-/// Rows of pixels of a workgroup of `raster_resolve`.
-const RESOLVED_ROWS: u32 = 32;
+/// Columns of pixels of a workgroup of `raster_resolve`.
+const RESOLVED_COLUMNS: u32 = 32;
 
 /// What draws triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -326,6 +326,10 @@ impl ComputeRaster {
             ("nearest", self.nearest.bound()),
         ];
         resources.extend(out.iter().cloned());
-        r.dispatch(&self.resolve, &resources, [size[0].div_ceil(8), size[1].div_ceil(RESOLVED_ROWS), layers]);
+        r.dispatch(
+            &self.resolve,
+            &resources,
+            [size[0].div_ceil(RESOLVED_COLUMNS), size[1].div_ceil(8), layers],
+        );
     }
 }
