@@ -174,10 +174,11 @@ impl LightView {
     }
 }
 
-/// The lamps of a scene and, where the environment's light may pass through thin parts and no lamp with shadows
+/// The lamps of a scene that shine and, where the environment's light may pass through thin parts and no lamp with shadows
 /// shines from behind the heads, a lamp without light there, whose shadow map gives their thickness.
 pub(crate) fn lamps(scene: &Scene<'_>, transmits: bool) -> Vec<Light> {
-    let mut lamps = scene.lights.to_vec();
+    let shines = |l: &&Light| l.color_linear.max_element() > 0.0;
+    let mut lamps: Vec<Light> = scene.lights.iter().filter(shines).copied().collect();
     let (center, _) = bounding_sphere(scene);
     let view = (center - scene.camera.position).normalize_or(Vec3::NEG_Z);
     let is_behind = |l: &Light| {
@@ -264,24 +265,42 @@ mod tests {
     }
 
     #[test]
+    fn lamps_that_are_off_cost_nothing() {
+        let kind = LightKind::Point { position: Vec3::Z };
+        let lamp =
+            |power: f32| Light { kind, color_linear: Vec3::splat(power), radius: 0.0, casts_shadow: true };
+        let lights = [lamp(0.0), lamp(2.0), lamp(0.0)];
+        let scene = Scene { lights: &lights, ..scene_of(1.0) };
+        let shining = lamps(&scene, true);
+        assert_eq!(shining.len(), 1);
+        assert_eq!(shining[0].color_linear, Vec3::splat(2.0));
+    }
+
+    fn scene_of(distance: f32) -> Scene<'static> {
+        Scene {
+            heads: &[],
+            camera: Camera {
+                position: distance * Vec3::Z,
+                target: Vec3::ZERO,
+                up: Vec3::Y,
+                fov_degrees: 20.0,
+            },
+            lights: &[],
+            environment: None,
+            environment_rotation: 0.0,
+            environment_intensity: 0.0,
+            background_linear: Vec3::ZERO,
+            optics: Default::default(),
+        }
+    }
+
+    #[test]
     fn maps_are_as_fine_as_the_picture_can_show() {
         let kind = LightKind::Directional { direction: Vec3::NEG_Z };
         let views = [LightView::fit(&kind, Vec3::ZERO, 0.16)];
         let receivers = [Sphere { center: Vec3::ZERO, radius: 0.15 }];
         let side = |distance: f32, height: u32, most: u32| {
-            let camera =
-                Camera { position: distance * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 };
-            let scene = Scene {
-                heads: &[],
-                camera,
-                lights: &[],
-                environment: None,
-                environment_rotation: 0.0,
-                environment_intensity: 0.0,
-                background_linear: Vec3::ZERO,
-                optics: Default::default(),
-            };
-            map_side(&scene, &views, &receivers, height, most)
+            map_side(&scene_of(distance), &views, &receivers, height, most)
         };
         // 0.32 m of which a pixel shows 0.28 mm: 1143 of them, and 11 430 texels.
         assert_eq!(side(1.0, 1080, 2048), 2048);
