@@ -13,7 +13,7 @@ use crate::passes::lens::depth_of_field::Behind;
 use crate::passes::shade::{Lighting, Lit, SkinLight};
 use crate::scene::lamp::{Illumination, map_side, place_lights};
 use crate::scene::placement::{average_light, receivers};
-use crate::scene::view::{Seen, View, Window, pixels_per_mm, view, windows};
+use crate::scene::view::{Seen, View, Window, nearest_pixel_metres, pixels_per_mm, view, windows};
 use crate::settings::DetailMethod;
 
 /// Results of the samples of a pixel so far.
@@ -38,10 +38,10 @@ impl<'a> Frame<'a> {
     pub(crate) fn light(&self, r: &mut Recorder<'_>) -> Illumination<'a> {
         let seen = receivers(self.scene, self.settings.output.size, self.needs.margin, self.needs.backs);
         let (lights, views) = place_lights(self.scene, &self.lamps, &seen);
-        let (quality, height) = (&self.settings.quality, self.settings.frame_size()[1]);
-        let side = match quality.detail {
-            DetailMethod::Auto => map_side(self.scene, &views, &seen, height, quality.shadow_size),
-            DetailMethod::Full => quality.shadow_size,
+        let most = self.settings.quality.shadow_size;
+        let side = match self.settings.quality.detail {
+            DetailMethod::Auto => map_side(&views, self.nearest_pixel_metres(), most),
+            DetailMethod::Full => most,
         };
         let shadows = self.passes.shadow.record(r, &views, &self.heads, side);
         Illumination {
@@ -52,6 +52,13 @@ impl<'a> Frame<'a> {
             environment_rotation: self.scene.environment_rotation,
             bounces: false,
         }
+    }
+
+    /// Width of a pixel on the nearest part of a head.
+    fn nearest_pixel_metres(&self) -> f32 {
+        let size = self.settings.frame_size();
+        let pixels = self.scene.heads.iter().map(|head| nearest_pixel_metres(self.scene, size, head));
+        pixels.reduce(f32::min).unwrap_or(0.0)
     }
 
     /// Light that heads send to themselves.

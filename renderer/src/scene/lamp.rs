@@ -174,11 +174,15 @@ impl LightView {
     }
 }
 
+/// Lamps that are not off.
+fn shining(lamps: &[Light]) -> Vec<Light> {
+    lamps.iter().filter(|l| l.color_linear.max_element() > 0.0).copied().collect()
+}
+
 /// The lamps of a scene that shine and, where the environment's light may pass through thin parts and no lamp with shadows
 /// shines from behind the heads, a lamp without light there, whose shadow map gives their thickness.
 pub(crate) fn lamps(scene: &Scene<'_>, transmits: bool) -> Vec<Light> {
-    let shines = |l: &&Light| l.color_linear.max_element() > 0.0;
-    let mut lamps: Vec<Light> = scene.lights.iter().filter(shines).copied().collect();
+    let mut lamps = shining(scene.lights);
     let (center, _) = bounding_sphere(scene);
     let view = (center - scene.camera.position).normalize_or(Vec3::NEG_Z);
     let is_behind = |l: &Light| {
@@ -199,22 +203,12 @@ pub(crate) fn lamps(scene: &Scene<'_>, transmits: bool) -> Vec<Light> {
 /// show differ by FLIP 0.0002 in the mean, and those of larger ones have maps as before.
 const TEXELS_PER_PIXEL: f32 = 10.0;
 
-/// Side of the maps of lamps in texels: `most`, halved while they are finer than a picture of a height in pixels shows.
-pub(crate) fn map_side(
-    scene: &Scene<'_>,
-    views: &[LightView],
-    receivers: &[Sphere],
-    height: u32,
-    most: u32,
-) -> u32 {
-    let camera = &scene.camera;
-    let nearest = receivers.iter().map(|s| s.center.distance(camera.position) - s.radius).reduce(f32::min);
-    let widest = views.iter().map(LightView::widest).reduce(f32::max);
-    let (Some(nearest), Some(widest)) = (nearest.filter(|d| *d > 0.0), widest) else { return most };
-    let pixel = 2.0 * nearest * (0.5 * camera.fov_degrees.to_radians()).tan() / height as f32;
-    let needed = TEXELS_PER_PIXEL * widest / pixel;
+/// Side of the maps of lamps in texels: `most`, halved while they are finer than a picture shows whose pixels are as wide as this on the
+/// nearest part of a head, metres; 0 where the camera may be in a head.
+pub(crate) fn map_side(views: &[LightView], pixel_metres: f32, most: u32) -> u32 {
+    let needed = views.iter().map(|v| TEXELS_PER_PIXEL * v.widest() / pixel_metres).fold(0.0, f32::max);
     let mut side = most;
-    while side > LEAST_SIDE && side as f32 >= 2.0 * needed {
+    while !views.is_empty() && side > LEAST_SIDE && side as f32 >= 2.0 * needed {
         side = side.div_ceil(2);
     }
     side
@@ -246,7 +240,6 @@ pub(crate) fn place_lights(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Camera;
 
     #[test]
     fn the_sphere_fits_the_map() {
@@ -269,47 +262,25 @@ mod tests {
         let kind = LightKind::Point { position: Vec3::Z };
         let lamp =
             |power: f32| Light { kind, color_linear: Vec3::splat(power), radius: 0.0, casts_shadow: true };
-        let lights = [lamp(0.0), lamp(2.0), lamp(0.0)];
-        let scene = Scene { lights: &lights, ..scene_of(1.0) };
-        let shining = lamps(&scene, true);
-        assert_eq!(shining.len(), 1);
-        assert_eq!(shining[0].color_linear, Vec3::splat(2.0));
-    }
-
-    fn scene_of(distance: f32) -> Scene<'static> {
-        Scene {
-            heads: &[],
-            camera: Camera {
-                position: distance * Vec3::Z,
-                target: Vec3::ZERO,
-                up: Vec3::Y,
-                fov_degrees: 20.0,
-            },
-            lights: &[],
-            environment: None,
-            environment_rotation: 0.0,
-            environment_intensity: 0.0,
-            background_linear: Vec3::ZERO,
-            optics: Default::default(),
-        }
+        assert_eq!(shining(&[lamp(0.0), lamp(2.0), lamp(0.0)]), [lamp(2.0)]);
     }
 
     #[test]
     fn maps_are_as_fine_as_the_picture_can_show() {
         let kind = LightKind::Directional { direction: Vec3::NEG_Z };
         let views = [LightView::fit(&kind, Vec3::ZERO, 0.16)];
-        let receivers = [Sphere { center: Vec3::ZERO, radius: 0.15 }];
-        let side = |distance: f32, height: u32, most: u32| {
-            map_side(&scene_of(distance), &views, &receivers, height, most)
-        };
-        // 0.32 m of which a pixel shows 0.28 mm: 1143 of them, and 11 430 texels.
-        assert_eq!(side(1.0, 1080, 2048), 2048);
-        // 4.9 mm: 65 pixels, 653 texels; half of them would be too few.
-        assert_eq!(side(1.0, 61, 2048), 1024);
-        assert_eq!(side(1.0, 61, 77), 77);
-        assert_eq!(side(16.0, 1080, 2048), 1024);
-        assert_eq!(side(1e5, 1080, 2048), 64);
-        assert_eq!(side(0.1, 16, 2048), 2048, "in the head");
+        let side = |pixel_mm: f32, most: u32| map_side(&views, 1e-3 * pixel_mm, most);
+        // 0.32 m are 1143 pixels, which need 11 430 texels.
+        assert_eq!(side(0.28, 2048), 2048);
+        // 65 pixels, 653 texels: half of 1024 would be too few.
+        assert_eq!(side(4.9, 2048), 1024);
+        assert_eq!(side(4.9, 77), 77);
+        assert_eq!(side(1e4, 2048), 64);
+        assert_eq!(side(0.0, 2048), 2048, "in the head");
+        assert_eq!(map_side(&[], 1.0, 2048), 2048, "no lamp");
+        // A lamp with a place sees more the farther it looks: 0.36 m at 2.15 m.
+        let lamp = LightView::fit(&LightKind::Point { position: 2.0 * Vec3::Z }, Vec3::ZERO, 0.16);
+        assert!((lamp.widest() - 0.32 * 2.16 / 2.0).abs() < 0.01, "{}", lamp.widest());
     }
 
     #[test]

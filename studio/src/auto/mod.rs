@@ -18,7 +18,7 @@ mod features;
 pub mod measured;
 mod shots;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use rubor_renderer::settings::{Leaf, Settings};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -31,6 +31,7 @@ pub use shots::{CALIBRATED, unseen_shots};
 
 use crate::error::{Failure, Outcome};
 use crate::measure::file_name;
+use crate::notes::Note;
 use crate::output;
 
 /// The measurements that ship with rubor: made by `rubor chart --calibrate` (docs/speed.md says where and when).
@@ -143,16 +144,22 @@ impl Calibration {
         serde_json::from_str(SHIPPED).map_err(Failure::job)
     }
 
-    /// That of the best of some devices for which one was kept, else the one that ships.
+    /// That of the best of some devices for which one was kept, else the one that ships; and what of those that were kept does not read.
     ///
     /// # Errors
     /// As [`Calibration::shipped`].
-    pub fn of_devices<'a>(names: impl IntoIterator<Item = &'a str>) -> Outcome<Self> {
-        let kept = names.into_iter().find_map(|name| {
-            let bytes = rubor_rig::limits::read(&kept_file(name)?).ok()?;
-            serde_json::from_slice(&bytes).ok().filter(|c: &Self| c.rubor == env!("CARGO_PKG_VERSION"))
-        });
-        kept.map_or_else(Self::shipped, Ok)
+    pub fn of_devices<'a>(names: impl IntoIterator<Item = &'a str>) -> Outcome<(Self, Vec<Note>)> {
+        let mut notes = Vec::new();
+        for file in names.into_iter().filter_map(kept_file).filter(|file| file.exists()) {
+            let bytes = rubor_rig::limits::read(&file).map_err(|e| e.to_string());
+            let kept = bytes.and_then(|b| serde_json::from_slice::<Self>(&b).map_err(|e| e.to_string()));
+            match kept {
+                Ok(kept) if kept.rubor == env!("CARGO_PKG_VERSION") => return Ok((kept, notes)),
+                Ok(kept) => notes.push(outdated(&file, &format!("made by rubor {}", kept.rubor))),
+                Err(why) => notes.push(outdated(&file, &why)),
+            }
+        }
+        Ok((Self::shipped()?, notes))
     }
 
     /// Keeps it for its device; returns the file, or none where the system names no folder for such data.
@@ -167,6 +174,13 @@ impl Calibration {
         output::write_json(&file, self)?;
         Ok(Some(file))
     }
+}
+
+/// Kept estimates are not used.
+fn outdated(file: &Path, why: &str) -> Note {
+    let message =
+        format!("estimates of this device are not used ({why}): `rubor chart --calibrate` makes them again");
+    Note::new(file.display().to_string(), message)
 }
 
 fn kept_file(device: &str) -> Option<PathBuf> {

@@ -362,7 +362,9 @@ fn judge(
     }
     console::notes(&notes);
     let name = studio.adapter().name;
-    let auto = Auto { bound: Bound::Flip(1.0), held, calibration: Calibration::of_devices([name.as_str()])? };
+    let (calibration, notes) = Calibration::of_devices([name.as_str()])?;
+    console::notes(&notes);
+    let auto = Auto { bound: Bound::Flip(1.0), held, calibration };
     let timing =
         experiment::Timing { rounds: arguments.rounds, frames: arguments.frames.unwrap_or(5).max(1) };
     studio.set_heads(std::iter::repeat_n(head, usize::from(arguments.heads)))?;

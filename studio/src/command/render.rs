@@ -179,7 +179,9 @@ fn parse_budget(text: &str) -> Result<Bound, String> {
 
 fn calibration() -> Outcome<Calibration> {
     let devices = rubor::studio::adapters();
-    Calibration::of_devices(devices.iter().map(|d| d.name.as_str()))
+    let (calibration, notes) = Calibration::of_devices(devices.iter().map(|d| d.name.as_str()))?;
+    console::notes(&notes);
+    Ok(calibration)
 }
 
 impl Changes {

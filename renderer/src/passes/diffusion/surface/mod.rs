@@ -358,7 +358,7 @@ impl Surface {
     }
 
     /// Whether light of samples comes with their normals.
-    pub(crate) fn has_normals(&self) -> bool {
+    fn has_normals(&self) -> bool {
         self.directional.is_some() || self.slabs.is_some()
     }
 
