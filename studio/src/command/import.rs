@@ -192,7 +192,11 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
                 }
                 head
             } else {
-                let mut loaded = rubor::inputs::plain_head(Some(source))?;
+                let is_recording = source.extension().is_some_and(|e| e == "csv" || e == "json");
+                let mut loaded = rubor::inputs::plain_head(Some(source)).map_err(|e| match is_recording {
+                    true => e.hint("`rubor import capture` reads recordings"),
+                    false => e,
+                })?;
                 console::notes(&loaded.notes);
                 if let Some(mesh) = &arguments.mesh {
                     Fit::choose(&mut loaded.head, &mut loaded.extent, mesh, source)?;

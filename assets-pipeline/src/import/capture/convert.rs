@@ -39,6 +39,9 @@ struct Curve {
     limited: usize,
 }
 
+/// Longest recording, seconds: a day.
+const LONGEST_S: f64 = 86_400.0;
+
 /// Largest error of the length of a recording whose times are rounded to milliseconds, seconds, with some room.
 const ROUNDING_S: f64 = 1.1e-3;
 
@@ -53,6 +56,14 @@ pub fn to_sequence(
 ) -> Result<(Sequence, Report), ImportError> {
     let wrong =
         |at: &str, found: String, expected: &str| ImportError::content(&recording.path, at, found, expected);
+    let length = recording.length_s();
+    if length > LONGEST_S {
+        return Err(wrong(
+            "length",
+            format!("{length} s"),
+            "at most a day: times in a smaller unit than is written?",
+        ));
+    }
     let rate = recording.rate();
     let fps = fps.unwrap_or(rate);
     if !(fps > 0.0 && fps <= 10_000.0) {
@@ -71,13 +82,12 @@ pub fn to_sequence(
     }
     // A take of n samples at the sequence's rate has n frames although its times may be rounded to milliseconds.
     let slack = (ROUNDING_S * fps).clamp(1e-3, 0.5);
-    let count = (recording.length_s() * fps + slack).floor() + 1.0;
-    if count > MOST_SAMPLES as f64 {
+    let count = (length * fps + slack).floor() as usize + 1;
+    if count > MOST_SAMPLES {
         let gap = times.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
         let found = format!("{count} frames at {fps} a second, samples up to {gap:.1} s apart");
         return Err(wrong("length", found, &format!("at most {MOST_SAMPLES} frames")));
     }
-    let count = count as usize;
     let mut report = Report {
         samples: times.len(),
         rate,
