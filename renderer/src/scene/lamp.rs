@@ -199,8 +199,7 @@ pub(crate) fn lamps(scene: &Scene<'_>, transmits: bool) -> Vec<Light> {
     lamps
 }
 
-/// Texels of a shadow map for a pixel of the picture beyond which nobody sees what more would show: pictures of a head that 60 pixels
-/// show differ by FLIP 0.0002 in the mean, and those of larger ones have maps as before.
+/// Texels of a shadow map for a pixel of the picture beyond which nobody sees what more would show (`docs/raster.md`).
 const TEXELS_PER_PIXEL: f32 = 10.0;
 
 /// Side of the maps of lamps in texels: `most`, halved while they are finer than a picture shows whose pixels are as wide as this on the
