@@ -246,14 +246,24 @@ fn seconds_of_times() -> Vec<Case> {
             Expect::Take(60.0, 120, 179.0 / 60.0),
         ),
         csv(
-            "samples years apart",
+            "samples hours apart",
             "error: at most 432000 frames",
+            table(
+                "timestamp",
+                &times(120, |i| format!("{}", i as f64 / 60.0 + if i > 60 { 1e4 } else { 0.0 })),
+            ),
+            &[],
+            Expect::Refused("samples up to 10000.0 s apart, expected at most 432000 frames"),
+        ),
+        csv(
+            "samples years apart",
+            "error: at most a day",
             table(
                 "timestamp",
                 &times(120, |i| format!("{}", i as f64 / 60.0 + if i > 60 { 1e9 } else { 0.0 })),
             ),
             &[],
-            Expect::Refused("samples up to 1000000000.0 s apart, expected at most 432000 frames"),
+            Expect::Refused("found 1000000001.9833333 s, expected at most a day"),
         ),
         csv(
             "timecodes among plain times",
