@@ -11,8 +11,9 @@ use rubor::job::InputFile;
 use rubor::{Job, Plan, Studio};
 use rubor_renderer::channels::Channel;
 use rubor_renderer::settings::{
-    AntialiasMethod, AntialiasPreset, ColorMethod, CurvatureMethod, MapSaving, RasterMethod, ScatterMethod,
-    Settings, SpecularMethod, ToneMap, TransmitMethod, WrinkleMethod,
+    AntialiasMethod, AntialiasPreset, BackdropMethod, BounceMethod, ColorMethod, CurvatureMethod,
+    DepthOfFieldMethod, DetailMethod, DitherMethod, MapSaving, RasterMethod, ScatterMethod, Settings,
+    SpecularMethod, ToneMap, TransmitMethod, WrinkleMethod,
 };
 use rubor_rig::expression::Rig;
 use rubor_rig::head::{BlendShape, Distribution, Head, Material, Mesh, Part, SkinMaps, Vertex, WrinkleZone};
@@ -25,6 +26,8 @@ use serde_json::{Value, json};
 const SHAPES: [&str; 6] =
     ["jawOpen", "mouthSmileLeft", "mouthSmileRight", "eyeBlinkLeft", "eyeBlinkRight", "browInnerUp"];
 const SIDE: u32 = 64;
+/// Jobs in a row with the same methods: shaders of new ones take most of the time.
+const JOBS_OF_METHODS: u64 = 100;
 
 /// A bulging sheet of skin 20 cm wide, with hair, maps, zones and shapes.
 fn head() -> LoadedHead {
@@ -176,6 +179,10 @@ fn sequence(dice: &mut Dice, expressions: usize) -> Value {
         let names = ["studio", "sky", "soft-box"];
         all["environment"] = json!({ "name": dice.one(&names), "intensity": dice.track(0.0, 4.0), "rotationDegrees": dice.track(-360.0, 360.0) });
     }
+    if dice.below(3) == 0 {
+        all["camera"]["fStop"] = dice.track(0.5, 128.0);
+        all["camera"]["focus"] = dice.track(0.05, 30.0);
+    }
     if dice.below(4) == 0 {
         // In the face, or far away.
         let distance = *dice.one(&[0.0, 0.02, 0.1, 30.0, 1e4]);
@@ -185,13 +192,13 @@ fn sequence(dice: &mut Dice, expressions: usize) -> Value {
     all
 }
 
-fn settings(dice: &mut Dice) -> Settings {
+/// Methods drawn from `methods`; size, map sizes and exposure from `dice`.
+fn settings(methods: &mut Dice, dice: &mut Dice) -> Settings {
     let mut settings = Settings::default();
-    let pick = |dice: &mut Dice, count: usize| dice.below(count);
     macro_rules! any {
         ($kind:ty) => {{
             let all: Vec<$kind> = <$kind>::all().collect();
-            all[pick(dice, all.len())]
+            *methods.one(&all)
         }};
     }
     let output = &mut settings.output;
@@ -207,16 +214,20 @@ fn settings(dice: &mut Dice) -> Settings {
     quality.color = any!(ColorMethod);
     quality.wrinkles = any!(WrinkleMethod);
     quality.specular = any!(SpecularMethod);
-    quality.raster = any!(RasterMethod);
+    quality.bounce = any!(BounceMethod);
+    // A processor takes over a second for what a graphics card rasterises by compute.
+    quality.raster = if methods.below(8) == 0 { RasterMethod::Compute } else { RasterMethod::Auto };
+    quality.detail = any!(DetailMethod);
+    quality.depth_of_field = any!(DepthOfFieldMethod);
     quality.antialias = any!(AntialiasMethod);
-    quality.antialias_preset = *dice.one(&[
+    quality.antialias_preset = *methods.one(&[
         AntialiasPreset::Low,
         AntialiasPreset::Medium,
         AntialiasPreset::High,
         AntialiasPreset::Ultra,
     ]);
     quality.pre_scatter = dice.number(0.0, 1.0) as f32;
-    quality.map_savings = MapSaving::ALL.into_iter().filter(|_| dice.below(2) == 0).collect();
+    quality.map_savings = MapSaving::ALL.into_iter().filter(|_| methods.below(2) == 0).collect();
     quality.shadow_size = *dice.one(&[16, 33, 64, 128]);
     // The reference methods and the largest maps take seconds at this size, and are tested elsewhere.
     quality.scatter = match quality.scatter {
@@ -230,7 +241,17 @@ fn settings(dice: &mut Dice) -> Settings {
         quality.transmit = TransmitMethod::ShadowDepth;
     }
     settings.look.exposure = *dice.one(&[0.0, 1.0, 1.8, 1e6]);
-    settings.look.tone_map = any!(ToneMap);
+    let look = &mut settings.look;
+    look.tone_map = any!(ToneMap);
+    look.dither = any!(DitherMethod);
+    look.backdrop = any!(BackdropMethod);
+    if methods.below(2) == 0 {
+        (look.bloom, look.bloom_radius) = (dice.number(0.0, 1.0) as f32, dice.number(0.002, 1.0) as f32);
+        (look.grain, look.grain_size) = (dice.number(0.0, 100.0) as f32, dice.number(1.0, 200.0) as f32);
+        (look.vignette, look.fade) = (dice.number(0.0, 16.0) as f32, dice.number(0.0, 500.0) as f32);
+        (look.temperature, look.tint) =
+            (dice.number(1500.0, 15000.0) as f32, dice.number(-150.0, 150.0) as f32);
+    }
     settings
 }
 
@@ -255,6 +276,16 @@ fn drawn(studio: &mut Studio, job: &Job, heads: &[LoadedHead]) -> Result<Vec<Vec
             if let Some(v) = data.values.iter().find(|v| !v.is_finite()) {
                 odd = Some(format!("{v} in {} of frame {}", data.channel.name(), shown.frame));
             }
+        }
+        if std::env::var_os("RUBOR_PROPERTY").is_some() {
+            let mut passes = shown.drawn.stats.passes_ms.clone();
+            passes.sort_by(|a, b| b.1.total_cmp(&a.1));
+            println!(
+                "frame {}: {:?} of {}",
+                shown.frame,
+                &passes[..passes.len().min(5)],
+                shown.drawn.stats.frame_ms
+            );
         }
         pictures.push(shown.drawn.image.rgba);
         Ok(())
@@ -281,6 +312,7 @@ fn random_frames_are_finite_and_repeat() {
             break;
         }
         let mut dice = Dice(SplitMix64(case));
+        let mut methods = Dice(SplitMix64(u64::MAX - case / JOBS_OF_METHODS));
         let rig_json = rig(&mut dice);
         let expressions = rig_json["expressions"].as_object().map_or(0, serde_json::Map::len);
         let sequence_json = sequence(&mut dice, expressions);
@@ -288,7 +320,7 @@ fn random_frames_are_finite_and_repeat() {
             let rig = Rig::from_json("rig", &rig_json.to_string()).map_err(|e| e.to_string())?;
             let sequence = Sequence::from_json("s", &sequence_json.to_string()).map_err(|e| e.to_string())?;
             let mut job = Job::new(&heads, rig, sequence).map_err(|e| e.to_string())?;
-            job.settings = settings(&mut dice);
+            job.settings = settings(&mut methods, &mut dice);
             Ok(job)
         })();
         count += 1;
@@ -299,6 +331,9 @@ fn random_frames_are_finite_and_repeat() {
                 continue;
             }
         };
+        if number("RUBOR_PROPERTY").is_some() {
+            println!("{}", serde_json::to_string(&job.settings).unwrap_or_default());
+        }
         let about = || format!("{case}: {}", serde_json::to_string(&job.settings).unwrap_or_default());
         let twice = catch_unwind(AssertUnwindSafe(|| {
             (drawn(&mut studio, &job, &heads), drawn(&mut studio, &job, &heads))

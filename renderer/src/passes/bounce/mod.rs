@@ -244,7 +244,6 @@ impl Bounce {
                 ("emitters", ways.emitters.bound()),
                 ("albedos", head.bouncing.albedos.bound()),
                 ("sent", head.bouncing.sent.bound()),
-                ("depth", lighting.seen.depth.bound()),
             ]);
             (resources, groups(EMITTERS * ways.patch_count, self.emitters_of_group))
         });

@@ -528,7 +528,6 @@ impl Shade {
             let mut resources = lighting.skin_light.map_or_else(Vec::new, |rule| rule.resources(h));
             resources.extend(self.resources(lighting, h, params));
             resources.extend([
-                ("depth", lighting.seen.depth.bound()),
                 ("first_visible", first.ids.bound()),
                 ("first_depth", first.depth.bound()),
                 ("diffuse_out", lit.irradiance.bound()),
@@ -584,7 +583,7 @@ impl Shade {
         let params: Vec<_> = heads.iter().map(|h| r.uniform("light through", &params(lighting, h))).collect();
         let each = heads.iter().zip(&params).map(|(h, params)| {
             let mut resources = self.resources(lighting, h, params);
-            resources.extend([("depth", lighting.seen.depth.bound()), ("through_out", through.bound())]);
+            resources.push(("through_out", through.bound()));
             (resources, lighting.seen.groups(h.index))
         });
         r.dispatch_each(kernel, each);
@@ -662,6 +661,7 @@ impl Shade {
             ("view", lighting.seen.view.bound()),
             ("params", params.bound()),
             ("visible", lighting.seen.ids.bound()),
+            ("depth", lighting.seen.depth.bound()),
             ("shadows", lighting.light.shadows.bound()),
             ("environment", lighting.light.environment.map_or(&self.black, |e| &e.filtered).bound()),
             ("trilinear_repeat", self.trilinear_repeat.bound()),

@@ -23,8 +23,11 @@ const SIZE: u32 = 128;
 /// Across the picture.
 const SEEN_MM: f32 = 12.0;
 
-/// A square of a material that faces +Z and, 5 mm in front of it and beside the picture, a flap of skin.
-fn head(material: Material, has_flap: bool) -> Head {
+/// A flap of skin beside the picture, 5 mm in front of what it shows: two of its corners, millimetres.
+const FLAP: [Vec3; 2] = [Vec3::new(8.0, -30.0, 5.0), Vec3::new(30.0, 30.0, 5.0)];
+
+/// A square of a material that faces +Z and flaps of skin in front of it.
+fn head(material: Material, flaps: &[[Vec3; 2]]) -> Head {
     let mut mesh = Mesh::default();
     let mut quad = |low: Vec3, high: Vec3, material: Material| {
         let first = mesh.vertices.len() as u32;
@@ -40,17 +43,15 @@ fn head(material: Material, has_flap: bool) -> Head {
         mesh.parts.push(Part { name: format!("{start}"), material, triangles: start..start + 2 });
     };
     quad(Vec3::new(-30.0, -30.0, 0.0), Vec3::new(30.0, 30.0, 0.0), material);
-    if has_flap {
-        quad(Vec3::new(8.0, -30.0, 5.0), Vec3::new(30.0, 30.0, 5.0), Material::Skin);
-    }
+    flaps.iter().for_each(|[low, high]| quad(*low, *high, Material::Skin));
     Head { name: "flap".into(), mesh, ..Head::default() }
 }
 
-/// Light of the middle row.
-fn row(renderer: &mut Renderer, material: Material, has_flap: bool) -> Vec<f32> {
-    let head = head(material, has_flap);
-    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &WHITE_TABLE).expect("it uploads");
-    let state = FaceState::neutral(&head);
+/// Green light of the picture in front of a head, by a lamp or an even sky.
+fn light_on(renderer: &mut Renderer, head: &Head, by_sky: bool) -> Vec<f32> {
+    let sky = EnvironmentMap::from_fn(16, 8, |_| Vec3::ONE).upload(renderer.gpu());
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), head, &WHITE_TABLE).expect("it uploads");
+    let state = FaceState::neutral(head);
     let heads = [HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }];
     let scene = Scene {
         heads: &heads,
@@ -63,27 +64,32 @@ fn row(renderer: &mut Renderer, material: Material, has_flap: bool) -> Vec<f32> 
         // The edge of the flap shadows x = 3 mm.
         lights: &[Light {
             kind: LightKind::Directional { direction: Vec3::new(-1.0, 0.0, -1.0).normalize() },
-            color_linear: Vec3::splat(2.0),
+            color_linear: Vec3::splat(if by_sky { 0.0 } else { 2.0 }),
             radius: 0.0,
             casts_shadow: true,
         }],
-        environment: None,
+        environment: by_sky.then_some(&sky),
         environment_rotation: 0.0,
-        environment_intensity: 0.0,
+        environment_intensity: 1.0,
         background_linear: Vec3::ZERO,
         optics: Default::default(),
     };
     let mut settings = settings([SIZE; 2]);
     settings.quality.shadow_size = 1024;
     render(renderer, &scene, &settings).expect("it draws");
-    let hdr = read_texels(renderer, Channel::Radiance);
-    (0..SIZE).map(|x| hdr[(SIZE / 2 * SIZE + x) as usize][1]).collect()
+    read_texels(renderer, Channel::Radiance).iter().map(|texel| texel[1]).collect()
+}
+
+/// Light of the middle row.
+fn row(renderer: &mut Renderer, material: Material, flaps: &[[Vec3; 2]]) -> Vec<f32> {
+    let first = (SIZE / 2 * SIZE) as usize;
+    light_on(renderer, &head(material, flaps), false)[first..first + SIZE as usize].to_vec()
 }
 
 /// Millimetres over which a shadow falls from nine to one tenth of the light, and where half of it is.
 fn edge_mm(renderer: &mut Renderer, material: Material) -> (f32, f32) {
-    let lit = row(renderer, material, false);
-    let shadowed = row(renderer, material, true);
+    let lit = row(renderer, material, &[]);
+    let shadowed = row(renderer, material, &[FLAP]);
     let seen: Vec<f32> = shadowed.iter().zip(&lit).map(|(s, l)| s / l).collect();
     assert!(seen[8] > 0.99 && seen[SIZE as usize - 8] < 0.01, "{seen:?}");
     let place = |share: f32| {
@@ -102,6 +108,32 @@ fn light_spreads_in_teeth_and_not_in_what_is_opaque() {
     assert!((1.0..2.6).contains(&soft_mm), "a disc of 1.3 mm about each place: {soft_mm} mm");
     // The shadow lies where it did.
     assert!((hard_at - 3.0).abs() < 0.25 && (soft_at - hard_at).abs() < 0.35, "{hard_at} and {soft_at}");
+}
+
+#[test]
+fn teeth_see_the_sky_between_the_lips() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut light = |flaps: &[[Vec3; 2]]| {
+        let picture = light_on(&mut renderer, &head(Material::Teeth, flaps), true);
+        // The middle, 2 mm to a side.
+        let middle: Vec<usize> = (SIZE / 2 - 10..SIZE / 2 + 10).map(|i| i as usize).collect();
+        let sum: f32 =
+            middle.iter().flat_map(|y| middle.iter().map(|x| picture[*y * SIZE as usize + *x])).sum();
+        sum / 400.0
+    };
+    let lips = |half: f32, before: f32| {
+        [
+            [Vec3::new(-30.0, half, before), Vec3::new(30.0, 30.0, before)],
+            [Vec3::new(-30.0, -30.0, before), Vec3::new(30.0, -half, before)],
+        ]
+    };
+    let open = light(&[]);
+    for (half, before) in [(4.0, 3.0), (2.5, 4.0), (4.5, 1.0)] {
+        // The form factor of a long slit in front of a plane.
+        let expected = half / f32::hypot(half, before);
+        let found = light(&lips(half, before)) / open;
+        assert!((found - expected).abs() < 0.05, "{half} mm by {before} mm: {found} for {expected}");
+    }
 }
 
 #[test]
