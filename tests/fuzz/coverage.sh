@@ -23,7 +23,8 @@ import json, re, sys
 # Every file that parses what comes from outside; writers, models and what needs several files stand elsewhere.
 ROWS = [
     ("glTF, VRM, the extension", r"assets-pipeline/src/(import/gltf/|facial_appearance\.rs)"),
-    ("OBJ, MTL, targets of MakeHuman", r"assets-pipeline/src/import/(obj|obj_file|mtl|makehuman/targets)\.rs"),
+    ("OBJ, MTL", r"assets-pipeline/src/import/(obj|obj_file|mtl)\.rs"),
+    ("targets of MakeHuman", r"assets-pipeline/src/import/makehuman/targets\.rs"),
     ("USD, packages", r"assets-pipeline/src/(import/usd[a-z_]*|usdz|check/usd)\.rs"),
     ("captures, retargeting", r"assets-pipeline/src/import/capture/"),
     ("Maya", r"maya-bridge/src/(ascii/|read/|appearance\.rs)"),
