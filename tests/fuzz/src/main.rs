@@ -29,27 +29,25 @@ struct Found {
     faults: Vec<String>,
 }
 
-/// A message without its numbers, without names in quotes, and with two words of what was found, as that has no end of
-/// kinds.
+/// A message without its numbers and without names in quotes; of what was found only two words, as that has no end of kinds.
 fn kind(message: &str) -> String {
-    let mut text = String::new();
-    let mut quote = None;
-    let mut chars = message.chars().take(500);
-    while let Some(c) = chars.next() {
-        match (quote, c) {
-            (_, '\\') => drop(chars.next()),
-            (Some(open), c) if c == open => quote = None,
-            (None, '"' | '`') => quote = Some(c),
-            (Some(_), _) => {}
-            (None, c) if c.is_ascii_digit() => {}
-            (None, c) => text.push(c),
+    let plain = |text: &str| -> String {
+        let mut quoted = false;
+        let mut out = String::new();
+        for c in text.chars().take(300) {
+            match c {
+                '"' => quoted = !quoted,
+                c if quoted || c.is_ascii_digit() => {}
+                c => out.push(c),
+            }
         }
-    }
-    let found = text.split_once("found ").and_then(|(_, rest)| rest.split_once(", expected "));
-    let Some((found, expected)) = found else { return text };
+        out
+    };
+    let found = message.split_once("found ").and_then(|(_, rest)| rest.rsplit_once(", expected "));
+    let Some((found, expected)) = found else { return plain(message) };
     let is_word = |w: &&str| w.chars().all(char::is_alphabetic);
-    let words: Vec<&str> = found.split_whitespace().filter(is_word).take(2).collect();
-    format!("{} / {expected}", words.join(" "))
+    let words: Vec<&str> = found.split_whitespace().take_while(is_word).take(2).collect();
+    format!("{} / {}", words.join(" "), plain(expected))
 }
 
 fn fuzz(target: &Target, seconds: f64, seed: u64) -> Found {

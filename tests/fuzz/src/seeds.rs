@@ -226,10 +226,19 @@ fn compressed() -> Vec<Vec<u8>> {
     all
 }
 
+/// Corners of a face of more than are cut exactly, around a circle.
+fn circle() -> impl Iterator<Item = [f32; 2]> {
+    (0..520).map(|k| (k as f32 * std::f32::consts::TAU / 520.0).sin_cos().into())
+}
+
 pub fn obj() -> Vec<Vec<u8>> {
+    let mut wide: String = circle().map(|[x, y]| format!("v {x} {y} 0\n")).collect();
+    wide += "f";
+    (1..=circle().count()).for_each(|corner| wide += &format!(" {corner}"));
     with(
         "obj",
         texts(&[
+            &wide,
             "o face\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl skin\nf 1/1 2/2 3/3 4/4\n",
             "mtllib a.mtl\nv 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\ng a b\ns 1\nf 1//1 2//1 -1//1\nl 1 2\n# end\n",
             "v 0 0 0\nv 1 0 \\\n 0\nv 0 1 0\nv 0.2 0.2 0\nf 1 2 3 4\nf -4 -3 -2\n",
@@ -436,6 +445,21 @@ def Xform "a" (kind = "component")
     let empty = rubor_assets::usdz::write(&[]).expect("a package");
     let deep = format!("#usda 1.0\n{}", "def \"a\" { ".repeat(100));
     let brackets = format!("#usda 1.0\n( a = {})", "[".repeat(100));
-    let faults = vec![squeezed, empty, deep.into_bytes(), brackets.into_bytes(), b"PXR-USDC".to_vec()];
+    let points: Vec<String> = circle().map(|[x, y]| format!("({x}, {y}, 0)")).collect();
+    let indices: Vec<String> = (0..points.len()).map(|i| i.to_string()).collect();
+    let wide = format!(
+        "#usda 1.0\ndef Mesh \"wide\"\n{{\n    int[] faceVertexCounts = [{}]\n    int[] faceVertexIndices = [{}]\n    point3f[] points = [{}]\n}}\n",
+        points.len(),
+        indices.join(", "),
+        points.join(", ")
+    );
+    let faults = vec![
+        wide.into_bytes(),
+        squeezed,
+        empty,
+        deep.into_bytes(),
+        brackets.into_bytes(),
+        b"PXR-USDC".to_vec(),
+    ];
     with("usd", [vec![layer.as_bytes().to_vec(), package], own.clone(), faults].concat())
 }
