@@ -40,6 +40,6 @@ for name, pattern in ROWS:
     total = [total[0] + count, total[1] + seen]
     print(f"| {name} | {count} | {100 * seen / max(count, 1):.0f} % |")
     for f, l in sorted(of_row.items()):
-        print(f"    {l['covered']:5} of {l['count']:5}  {re.search(pattern + ".*", f).group()}", file=sys.stderr)
+        print(f"    {l['covered']:5} of {l['count']:5}  {re.search(pattern + '.*', f).group()}", file=sys.stderr)
 print(f"| all | {total[0]} | {100 * total[1] / max(total[0], 1):.1f} % |")
 PYTHON
