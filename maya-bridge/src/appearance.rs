@@ -150,13 +150,22 @@ impl Appearance {
         Ok(read)
     }
 
-    /// Reads the maps beside the scene. Maps that cannot be read are named and left out.
+    /// Reads the maps beside the scene. Maps that cannot be read are named and left out, with what is nothing without them.
     pub(crate) fn load_maps(&self, folder: &Path, notes: &mut Vec<String>) -> SkinMaps {
         let (hair_color_linear, hair_count) = (self.hair_color_linear, self.hair_count);
         let mut maps = SkinMaps { hair_color_linear, hair_count, ..SkinMaps::default() };
         let mut scales: BTreeMap<String, Map> = BTreeMap::new();
         for entry in &self.maps {
-            let map = match load(entry, folder) {
+            let channels = match entry.role.as_str() {
+                "albedo" => 3,
+                "slopes" | "specular" | "wrinkleSlopes" => 2,
+                _ => 1,
+            };
+            let read = load(entry, folder).and_then(|map| match map.channels == channels {
+                true => Ok(map),
+                false => Err(format!("{} channels, where {channels} belong", map.channels)),
+            });
+            let map = match read {
                 Ok(map) => map,
                 Err(reason) => {
                     notes.push(format!("the map {} {} was left out: {reason}", entry.role, entry.name));
@@ -192,6 +201,21 @@ impl Appearance {
                 }),
                 other => notes.push(format!("the map role {other:?} is not known and was left out")),
             }
+        }
+        // Zones name wrinkle maps by their place: where one is gone, the others are not theirs.
+        let written = self.maps.iter().filter(|entry| entry.role == "wrinkleSlopes").count();
+        if maps.wrinkle_slopes.len() < written {
+            maps.wrinkle_slopes.clear();
+        }
+        let known = maps.wrinkle_slopes.len();
+        let zones = maps.zones.len();
+        maps.zones.retain(|zone| (zone.wrinkle_map as usize) < known);
+        if maps.zones.len() < zones {
+            notes.push("wrinkle zones were left out, as their wrinkle maps are not there".into());
+        }
+        if maps.hemoglobin_mean.is_none() && !maps.distributions.is_empty() {
+            maps.distributions.clear();
+            notes.push("hemoglobin distributions were left out, as their mean is not there".into());
         }
         maps
     }
@@ -293,5 +317,47 @@ mod tests {
             assert!(read(name).unwrap_err().contains("no name of a file beside the scene"), "{name}");
         }
         assert!(read("none.png").unwrap_err().contains("none.png"));
+    }
+
+    #[test]
+    fn a_lost_map_takes_with_it_what_is_nothing_without_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = |channels: usize| Map::filled(2, 2, &[0.25, 0.5, 0.75][..channels]);
+        let zone = WrinkleZone { name: "brow".into(), wrinkle_map: 1, mask: map(1) };
+        let maps = SkinMaps {
+            melanin: Some(map(1)),
+            hemoglobin_mean: Some(map(1)),
+            distributions: vec![Distribution { name: "joy".into(), scale: map(1), bias: map(1) }],
+            wrinkle_slopes: vec![map(2), map(2)],
+            zones: vec![zone],
+            ..SkinMaps::default()
+        };
+        let head = Head { maps, ..Head::default() };
+        let (mut appearance, files) = Appearance::of(&head, "t").unwrap();
+        for (name, bytes) in files {
+            std::fs::write(folder.path().join(name), bytes).unwrap();
+        }
+        let mut notes = Vec::new();
+        assert_eq!(appearance.load_maps(folder.path(), &mut notes).zones.len(), 1);
+        assert!(notes.is_empty(), "{notes:?}");
+        for entry in &mut appearance.maps {
+            match entry.role.as_str() {
+                "hemoglobinMean" => entry.file = "gone.png".into(),
+                // A second channel.
+                "melanin" => (entry.offset, entry.scale) = (vec![0.0; 2], vec![1.0; 2]),
+                _ => {}
+            }
+        }
+        let first = appearance.maps.iter_mut().find(|e| e.role == "wrinkleSlopes").unwrap();
+        first.file = "gone.png".into();
+        let maps = appearance.load_maps(folder.path(), &mut notes);
+        let head = Head { maps, ..Head::default() };
+        head.validate().unwrap();
+        assert_eq!(head.maps, SkinMaps::default());
+        for words in
+            ["map melanin", "map hemoglobinMean", "map wrinkleSlopes", "wrinkle zones", "distributions"]
+        {
+            assert!(notes.iter().any(|n| n.contains(words)), "{words}: {notes:?}");
+        }
     }
 }

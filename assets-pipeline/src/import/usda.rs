@@ -117,7 +117,7 @@ pub fn parse(bytes: &[u8]) -> Result<Layer, UsdaError> {
     let mut reader = Reader { text: text.as_bytes(), at: 0, line: 1 };
     let mut layer = Layer::default();
     if reader.peek() == Some(b'(') {
-        reader.metadata(&mut layer.metadata)?;
+        reader.metadata(&mut layer.metadata, 0)?;
     }
     while reader.peek().is_some() {
         reader.prim("", &mut layer.prims, 0)?;
@@ -249,7 +249,9 @@ impl Reader<'_> {
                 let close = if open == b'[' { b']' } else { b')' };
                 let mut list = Vec::new();
                 while !self.take(close) {
-                    list.push(self.value(level + 1)?);
+                    let value = self.value(level + 1)?;
+                    self.behind_arc(&value, level)?;
+                    list.push(value);
                     if !self.take(b',') {
                         self.expect(close, "a comma or the end of a list")?;
                         break;
@@ -309,8 +311,19 @@ impl Reader<'_> {
         }
     }
 
+    /// Passes over what an arc carries behind its layer or prim: `</prim> (offset = 1; scale = 2)`.
+    fn behind_arc(&mut self, value: &Value, level: usize) -> Result<(), UsdaError> {
+        if matches!(value, Value::Asset(_)) && self.peek() == Some(b'<') {
+            self.value(level + 1)?;
+        }
+        if matches!(value, Value::Asset(_) | Value::Path(_)) && self.peek() == Some(b'(') {
+            self.metadata(&mut BTreeMap::new(), level + 1)?;
+        }
+        Ok(())
+    }
+
     /// `( name = value ... )`
-    fn metadata(&mut self, into: &mut BTreeMap<String, Value>) -> Result<(), UsdaError> {
+    fn metadata(&mut self, into: &mut BTreeMap<String, Value>, level: usize) -> Result<(), UsdaError> {
         self.expect(b'(', "metadata")?;
         while !self.take(b')') {
             if let Some(comment) = self.string()? {
@@ -325,11 +338,8 @@ impl Reader<'_> {
                 return self.fail("the name of metadata");
             }
             self.expect(b'=', "a value of metadata")?;
-            let value = self.value(0)?;
-            // References carry their prim behind them.
-            if self.peek() == Some(b'<') {
-                self.value(0)?;
-            }
+            let value = self.value(level)?;
+            self.behind_arc(&value, level)?;
             into.insert(name, value);
         }
         Ok(())
@@ -353,7 +363,7 @@ impl Reader<'_> {
         let Some(name) = self.string()? else { return self.fail("the name of a prim") };
         prim.path = format!("{parent}/{name}");
         if self.peek() == Some(b'(') {
-            self.metadata(&mut prim.metadata)?;
+            self.metadata(&mut prim.metadata, 0)?;
         }
         self.expect(b'{', "the start of a prim")?;
         let (path, index) = (prim.path.clone(), prims.len());
@@ -400,7 +410,7 @@ impl Reader<'_> {
                 return self.fail("the name of a variant");
             }
             if self.peek() == Some(b'(') {
-                self.metadata(&mut BTreeMap::new())?;
+                self.metadata(&mut BTreeMap::new(), 0)?;
             }
             self.expect(b'{', "a variant")?;
             let mut open = 1_usize;
@@ -454,7 +464,7 @@ impl Reader<'_> {
         }
         let value = if self.take(b'=') { Some(self.value(0)?) } else { None };
         if self.peek() == Some(b'(') {
-            self.metadata(details)?;
+            self.metadata(details, 0)?;
         }
         Ok((name, value))
     }

@@ -189,3 +189,27 @@ fn a_layer_of_another_program_is_read() {
     let read = from_bytes(LAYER.as_bytes(), Path::new("/none/a.usda")).unwrap();
     says(&read, "picture cannot be read", "gradient.png");
 }
+
+#[test]
+fn arcs_with_prims_and_offsets_are_passed_over() {
+    let layer = |arcs: &str| {
+        format!(
+            "#usda 1.0\n(\n    subLayers = [@a.usda@ (offset = 1; scale = 2), @b.usda@]\n)\n\
+             def Mesh \"m\" (\n    {arcs}\n    kind = \"component\"\n)\n{{\n    int[] faceVertexCounts = [3]\n    \
+             int[] faceVertexIndices = [0, 1, 2]\n    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\n}}\n"
+        )
+    };
+    let read = |arcs: &str| from_bytes(layer(arcs).as_bytes(), Path::new("a.usda"));
+    for arcs in [
+        "prepend references = [@a.usda@</A>, @b.usda@</B> (offset = 1), </C> (scale = 2)]",
+        "references = @a.usda@</A> (\n        offset = 1\n        customData = { string by = \"me\" }\n    )",
+        "references = </A> (offset = 1)",
+    ] {
+        let imported = read(arcs).unwrap();
+        says(&imported, "references are not followed", "/m");
+        says(&imported, "sublayers are not read", "");
+    }
+    let deep = format!("references = {}", "[@a@ (b = ".repeat(100_000));
+    let error = read(&deep).expect_err("no end of levels").to_string();
+    assert!(error.contains("fewer levels of brackets"), "{error}");
+}

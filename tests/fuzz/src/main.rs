@@ -7,13 +7,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use rubor_fuzz::mutate::Random;
+use rubor_fuzz::mutate::{Random, Stock, dictionary};
 use rubor_fuzz::{TARGETS, Target};
 
 /// Longest time of one input.
 const LONGEST: Duration = Duration::from_secs(10);
 /// Inputs that are kept to go on from.
 const MOST_KEPT: usize = 4096;
+/// Kinds of errors and notes that are told apart.
+const MOST_KINDS: usize = 1 << 16;
 /// Longest input that is kept, bytes.
 const LARGEST: usize = 1 << 16;
 
@@ -22,45 +24,63 @@ struct Found {
     executions: u64,
     refused: u64,
     longest: Duration,
-    /// Kinds of messages.
+    /// Kinds of errors and notes.
     messages: usize,
     faults: Vec<String>,
 }
 
-/// A message without its numbers and names.
+/// A message without its numbers and without names in quotes; of what was found only two words, as that has no end of kinds.
 fn kind(message: &str) -> String {
-    let mut out = String::new();
-    let mut in_quotes = false;
-    for c in message.chars().take(300) {
-        match c {
-            '"' => in_quotes = !in_quotes,
-            c if in_quotes || c.is_ascii_digit() => {}
-            c => out.push(c),
+    let plain = |text: &str| -> String {
+        let mut quoted = false;
+        let mut out = String::new();
+        for c in text.chars().take(300) {
+            match c {
+                '"' => quoted = !quoted,
+                c if quoted || c.is_ascii_digit() => {}
+                c => out.push(c),
+            }
         }
-    }
-    out
+        out
+    };
+    let found = message.split_once("found ").and_then(|(_, rest)| rest.rsplit_once(", expected "));
+    let Some((found, expected)) = found else { return plain(message) };
+    let is_word = |w: &&str| w.chars().all(char::is_alphabetic);
+    let words: Vec<&str> = found.split_whitespace().take_while(is_word).take(2).collect();
+    format!("{} / {}", words.join(" "), plain(expected))
 }
 
 fn fuzz(target: &Target, seconds: f64, seed: u64) -> Found {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let found = Mutex::new(Found::default());
     let known: Mutex<HashSet<String>> = Mutex::default();
-    let kept = Mutex::new((target.seeds)());
+    let seeds = (target.seeds)();
+    let seed_count = seeds.len();
+    let kept = Mutex::new(seeds);
+    let words = dictionary(target.dictionary);
     let start = Instant::now();
     std::thread::scope(|scope| {
         for thread in 0..threads {
-            let (found, known, kept) = (&found, &known, &kept);
+            let (found, known, kept, words) = (&found, &known, &kept, &words);
             scope.spawn(move || {
                 let mut random = Random::new(seed.wrapping_mul(1_000_003) + thread as u64);
                 let mut mine = Found::default();
+                // Every seed is read as it is before any is changed.
+                let mut seeds = if thread == 0 { (target.seeds)() } else { Vec::new() };
                 while start.elapsed().as_secs_f64() < seconds {
-                    let mut input = {
-                        let kept = kept.lock().expect("no thread panics with it");
-                        kept[random.below(kept.len())].clone()
-                    };
-                    for _ in 0..=random.below(4) {
-                        (target.mutate)(&mut input, &mut random);
-                    }
+                    let input = seeds.pop().unwrap_or_else(|| {
+                        let (mut input, other) = {
+                            let kept = kept.lock().expect("no thread panics with it");
+                            // Half of the time a seed: most of the others are refused.
+                            let among = if random.below(2) == 0 { seed_count } else { kept.len() };
+                            (kept[random.below(among)].clone(), kept[random.below(seed_count)].clone())
+                        };
+                        let stock = Stock { words, other: &other };
+                        for _ in 0..=random.below(2) * random.below(4) {
+                            (target.mutate)(&mut input, &stock, &mut random);
+                        }
+                        input
+                    });
                     let began = Instant::now();
                     let result = catch_unwind(AssertUnwindSafe(|| (target.run)(&input)));
                     let took = began.elapsed();
@@ -69,18 +89,25 @@ fn fuzz(target: &Target, seconds: f64, seed: u64) -> Found {
                     if took > LONGEST {
                         mine.faults.push(store(target, &input, "slow"));
                     }
-                    match result {
-                        Err(_) => mine.faults.push(store(target, &input, "panic")),
-                        Ok(Ok(())) => {}
+                    let said = match result {
+                        Err(_) => {
+                            mine.faults.push(store(target, &input, "panic"));
+                            continue;
+                        }
+                        Ok(Ok(notes)) => notes,
                         Ok(Err(message)) => {
                             mine.refused += 1;
-                            let is_new =
-                                known.lock().expect("no thread panics with it").insert(kind(&message));
-                            let mut kept = kept.lock().expect("no thread panics with it");
-                            if is_new && input.len() < LARGEST && kept.len() < MOST_KEPT {
-                                kept.push(input);
-                            }
+                            vec![message]
                         }
+                    };
+                    let is_new = {
+                        let mut known = known.lock().expect("no thread panics with it");
+                        let room = MOST_KINDS.saturating_sub(known.len());
+                        said.iter().take(room).fold(false, |is_new, said| known.insert(kind(said)) | is_new)
+                    };
+                    let mut kept = kept.lock().expect("no thread panics with it");
+                    if is_new && input.len() < LARGEST && kept.len() < MOST_KEPT {
+                        kept.push(input);
                     }
                 }
                 let mut all = found.lock().expect("no thread panics with it");
@@ -137,7 +164,7 @@ fn main() {
             eprintln!("{info}");
         }
     }));
-    println!("| target | executions | refused | kinds of errors | longest, ms | faults |");
+    println!("| target | executions | refused | kinds of messages | longest, ms | faults |");
     println!("| --- | --- | --- | --- | --- | --- |");
     let (mut executions, mut faults) = (0, Vec::new());
     for target in chosen {

@@ -70,7 +70,7 @@ pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Recording, ImportError> {
         None => None,
         Some((name, value)) => match value.as_f64().filter(|f| *f > 0.0 && *f <= 10_000.0) {
             Some(fps) => Some(fps),
-            None => return Err(reader.wrong(name, &value.to_string(), "frames per second")),
+            None => return Err(reader.wrong(name, &shown(value), "frames per second")),
         },
     };
     match (first(&root, &COLUMN_NAMES), first(&root, &COLUMN_ROWS)) {
@@ -108,6 +108,19 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
+/// A value as messages show it: a list or an object may be as long as the file.
+fn shown(value: &Value) -> String {
+    const LONGEST: usize = 60;
+    if value.is_array() || value.is_object() {
+        return kind(value).to_owned();
+    }
+    let text = value.to_string();
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text,
+    }
+}
+
 struct Reader<'a> {
     path: &'a Path,
     recording: Recording,
@@ -122,14 +135,14 @@ impl Reader<'_> {
 
     fn number(&self, value: &Value, at: impl Fn() -> String) -> Result<f32, ImportError> {
         let number = value.as_f64().map(|v| v as f32).filter(|v| v.abs() <= LARGEST);
-        number.ok_or_else(|| self.wrong(&at(), &value.to_string(), "a finite number, at most a million"))
+        number.ok_or_else(|| self.wrong(&at(), &shown(value), "a finite number, at most a million"))
     }
 
     fn columns(&mut self, names: &[Value], field: &str, rows: &[Value], fps: f64) -> Result<(), ImportError> {
         let mut channels = Vec::new();
         for (i, name) in names.iter().enumerate() {
             let Some(name) = name.as_str() else {
-                return Err(self.wrong(&format!("name {i}"), &name.to_string(), "a text"));
+                return Err(self.wrong(&format!("name {i}"), &shown(name), "a text"));
             };
             channels.push(Channel { name: name.to_owned(), values: Vec::with_capacity(rows.len()) });
         }
@@ -178,7 +191,7 @@ impl Reader<'_> {
                     Some(time) => (name, time),
                     None => {
                         let at = format!("frame {i}, {name}");
-                        return Err(self.wrong(&at, &value.to_string(), "a number"));
+                        return Err(self.wrong(&at, &shown(value), "a number"));
                     }
                 },
                 None => ("", i as f64 / fps.unwrap_or(DEFAULT_FPS)),
@@ -260,7 +273,7 @@ impl Reader<'_> {
             let name = first(entry, &["categoryName", "category_name", "name"]).and_then(|(_, v)| v.as_str());
             let value = first(entry, &["score", "value", "weight"]);
             let (Some(name), Some((_, value))) = (name, value) else {
-                return Err(self.wrong(&at(), &entry.to_string(), "an object with categoryName and score"));
+                return Err(self.wrong(&at(), &shown(entry), "an object with categoryName and score"));
             };
             weights.push((name.to_owned(), self.number(value, at)?));
         }

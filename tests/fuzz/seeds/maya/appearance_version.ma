@@ -1,0 +1,25 @@
+//Maya ASCII 2024 scene
+requires maya "2024";
+createNode transform -n "rubor_head";
+	addAttr -ci true -sn "rfa" -ln "ruborFacialAppearance" -dt "string";
+	setAttr ".rfa" -type "string" "{\"version\": 9, \"name\": \"by hand\", \"parts\": [{\"name\": \"face skin\", \"material\": \"skin\"}], \"shapes\": [\"mouth smile\"], \"landmarks\": {\"pronasale\": [0, 0, 0]}, \"occlusion\": [0.5, 0.5, 1], \"shapeOcclusion\": {\"mouth smile\": [[0, 0.1, 0.2]]}, \"maps\": [{\"role\": \"melanin\", \"name\": \"\", \"file\": \"gray.png\", \"offset\": [0.1], \"scale\": [0.1]}, {\"role\": \"hemoglobinMean\", \"name\": \"\", \"file\": \"gray.png\", \"offset\": [0.1], \"scale\": [0.1]}, {\"role\": \"slopes\", \"name\": \"\", \"file\": \"gray.png\", \"offset\": [0, 0], \"scale\": [0, 0]}, {\"role\": \"albedo\", \"name\": \"\", \"file\": \"gray.png\", \"offset\": [0.1, 0.1, 0.1], \"scale\": [0.1, 0.1, 0.1]}, {\"role\": \"specular\", \"name\": \"\", \"file\": \"gone.png\", \"offset\": [0], \"scale\": [0]}, {\"role\": \"hair\", \"name\": \"\", \"file\": \"../gray.png\", \"offset\": [0], \"scale\": [0]}, {\"role\": \"scattering\", \"name\": \"\", \"file\": \"gray.png\", \"offset\": [], \"scale\": []}, {\"role\": \"zone\", \"name\": \"brow\", \"file\": \"gray.png\", \"offset\": [0, 0, 0, 0], \"scale\": [0, 0, 0, 0]}, {\"role\": \"zone\", \"name\": \"brow\", \"file\": \"gray.png\", \"offset\": [0], \"scale\": [0]}, {\"role\": \"other\", \"name\": \"\", \"file\": \"gray.png\", \"offset\": [0], \"scale\": [0]}, {\"role\": \"distributionBias\", \"name\": \"joy\", \"file\": \"gray.png\", \"offset\": [0], \"scale\": [0]}]}";
+	setAttr ".ro" 2;
+	setAttr ".ry" 10;
+createNode mesh -n "headShape" -p "rubor_head";
+	setAttr ".iog[0].og[0].gcl" -type "componentList" 1 "f[0]";
+	setAttr -s 3 ".vt[0:2]" 0 0 0 1 0 0 0 1 0;
+	setAttr -s 3 ".ed[0:2]" 0 1 0 1 2 0 2 0 0;
+	setAttr ".fc[0]" -type "polyFaces" f 3 0 1 2;
+createNode mesh -n "headOrig" -p "rubor_head";
+	setAttr ".io" yes;
+	setAttr -s 3 ".vt[0:2]" 0 0 0 1 0 0 0 1 0;
+	setAttr -s 3 ".ed[0:2]" 0 1 0 1 2 0 2 0 0;
+	setAttr ".fc[0]" -type "polyFaces" f 3 0 1 2;
+createNode shadingEngine -n "rubor_0_face_skin_SG";
+connectAttr "headShape.iog[0].og[0]" "rubor_0_face_skin_SG.dsm" -na;
+createNode blendShape -n "bs";
+	setAttr ".it[0].itg[0].iti[6000].ipt" -type "pointArray" 1 0 1 0 1;
+	setAttr ".it[0].itg[0].iti[6000].ict" -type "componentList" 1 "vtx[0]";
+	setAttr ".aal" -type "attributeAlias" {"mouth_smile","weight[0]"};
+connectAttr "headOrig.w" "bs.ip[0].ig";
+connectAttr "bs.og[0]" "headShape.i";
