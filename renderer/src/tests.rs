@@ -157,7 +157,7 @@ fn structs_are_laid_out_alike_on_both_sides() {
         "overlay_vertex",
         "Params",
         size_of::<overlay::Params>(),
-        &offsets!(overlay::Params; ambient as "ambient", first as "first", hair as "hair"),
+        &offsets!(overlay::Params; ambient as "ambient", first as "first", share as "share", hair as "hair"),
     );
     assert_layout(
         &resolve::program(ToneMap::Filmic),

@@ -161,14 +161,14 @@ impl<'a> Frame<'a> {
         let onto = Onto::Picture(&hdr, velocity.as_ref());
         passes.cropped_hair.record(r, hair, detail, &seen, &self.heads, rest, onto);
         let ambient = average_light(self.scene);
-        passes.overlay.record(r, hair, ambient, &seen, &self.heads, onto);
+        passes.overlay.record(r, hair, ambient, detail, &seen, &self.heads, onto);
         if self.keeps(Channel::Hair) {
             // A new image is zero: nothing covers it.
             let spec = ImageSpec::light(seen.ids.size()).also(wgpu::TextureUsages::RENDER_ATTACHMENT);
             let layer = Image::new(r.gpu, "hair", spec);
             let onto = Onto::Layer(&layer);
             passes.cropped_hair.record(r, hair, detail, &seen, &self.heads, false, onto);
-            passes.overlay.record(r, hair, ambient, &seen, &self.heads, onto);
+            passes.overlay.record(r, hair, ambient, detail, &seen, &self.heads, onto);
             self.keep([(Channel::Hair, &layer)]);
         }
         let lighting = Lighting {

@@ -36,14 +36,27 @@ const CLEAR: f32 = 0.005;
 /// From the top of the head to the crown, metres: hair flows away from there.
 const CROWN: Vec3 = Vec3::new(0.006, -0.004, -0.048);
 
-/// Random numbers (M. O'Neill 2014, PCG-RXS-M-XS).
+/// Random bits of a number (M. O'Neill 2014, PCG-RXS-M-XS).
+pub(crate) fn hash(number: u32) -> u32 {
+    mixed_bits(advanced(number))
+}
+
+fn advanced(state: u32) -> u32 {
+    state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453)
+}
+
+fn mixed_bits(state: u32) -> u32 {
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+/// Random numbers, the bits of one state after the other.
 struct Random(u32);
 
 impl Random {
     fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        let word = ((self.0 >> ((self.0 >> 28) + 4)) ^ self.0).wrapping_mul(277_803_737);
-        ((word >> 22) ^ word) as f32 * (1.0 / 4_294_967_296.0)
+        self.0 = advanced(self.0);
+        mixed_bits(self.0) as f32 * (1.0 / 4_294_967_296.0)
     }
 }
 

@@ -18,6 +18,7 @@ use super::footprint::{APPEARANCE_SIZE, largest_of, mask_size, slope_size};
 use super::hair_roots::{Root, drawn_hairs, moved_roots, roots};
 use super::level::ERROR_PIXELS;
 use super::posed_head::instance_bytes;
+use super::strands;
 use crate::device::kernel::Resource;
 use crate::device::texture::{self, Texel};
 use crate::device::{Bind, Gpu};
@@ -72,6 +73,8 @@ pub struct HeadOnGpu {
     /// How many of these, the last ones, are seen through where they are not quite opaque.
     pub(crate) see_through_triangles: u32,
     pub(crate) overlay_triangles: u32,
+    /// How many of these there are before the first strand, and after each.
+    pub(crate) strand_ends: Vec<u32>,
     pub(crate) shape_count: usize,
     pub(crate) rest: wgpu::Buffer,
     pub(crate) delta_starts: wgpu::Buffer,
@@ -301,6 +304,7 @@ impl HeadOnGpu {
             cut_triangles: cut,
             see_through_triangles: see_through,
             overlay_triangles: overlay,
+            strand_ends: strands::ordered(head).1,
             shape_count: head.shapes.len(),
             rest: gpu.storage("rest points", &rest),
             delta_starts: gpu.storage("delta starts", &delta_starts),
@@ -486,7 +490,7 @@ pub fn triangles_of_ids(head: &Head) -> Vec<u32> {
 }
 
 /// Triangles of a head in the order of the device's list: opaque ones first, the last of them those with holes,
-/// of these the last ones those that are seen through; then overlays; hidden ones are left out. How many are opaque, have
+/// of these the last ones those that are seen through; then overlays in the order of [`strands`]; hidden ones are left out. How many are opaque, have
 /// holes, are seen through, and are overlays.
 fn triangle_order(head: &Head) -> (Vec<u32>, [u32; 4]) {
     // Backs of parts with one side are holes too; skin has two.
@@ -512,7 +516,7 @@ fn triangle_order(head: &Head) -> (Vec<u32>, [u32; 4]) {
     let solid = triangles.len() as u32;
     triangles.extend(of(&|i, m| m.is_opaque() && is_see_through(i)));
     let opaque = triangles.len() as u32;
-    triangles.extend(of(&|_, m| !m.is_opaque() && m != Material::Hidden));
+    triangles.extend(strands::ordered(head).0);
     let overlay = triangles.len() as u32 - opaque;
     (triangles, [opaque, opaque - whole, opaque - solid, overlay])
 }

@@ -15,6 +15,7 @@ pub(crate) mod level;
 mod optics;
 pub(crate) mod placement;
 pub(crate) mod posed_head;
+pub(crate) mod strands;
 pub(crate) mod view;
 
 pub use environment::{Environment, EnvironmentMap};
