@@ -1,6 +1,6 @@
 //! Random rigs, sequences and qualities: frames without NaN, panic or error of the device, twice the same bytes.
 //!
-//! A few by default; `RUBOR_PROPERTIES=10000` (`make check-hardening`) draws more. A failure prints its number, and
+//! A few by default; `RUBOR_PROPERTIES=10000` (`make check-hardening`) draws more, `RUBOR_PROPERTIES=1700..10000` some of them. A failure prints its number, and
 //! `RUBOR_PROPERTY=n` draws that one alone.
 
 use std::io::Write;
@@ -298,9 +298,10 @@ fn drawn(studio: &mut Studio, job: &Job, heads: &[LoadedHead]) -> Result<Vec<Vec
 fn random_frames_are_finite_and_repeat() {
     let Some(mut studio) = can_draw() else { return };
     let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
-    let range = match number("RUBOR_PROPERTY") {
-        Some(one) => one..one + 1,
-        None => 0..number("RUBOR_PROPERTIES").unwrap_or(6),
+    let range = match (number("RUBOR_PROPERTY"), std::env::var("RUBOR_PROPERTIES")) {
+        (Some(one), _) => one..one + 1,
+        (None, Ok(text)) => range_of(&text).expect("RUBOR_PROPERTIES is a number, or two with .. between"),
+        (None, Err(_)) => 0..6,
     };
     let seconds = number("RUBOR_PROPERTY_SECONDS").unwrap_or(u64::MAX);
     let start = std::time::Instant::now();
@@ -363,6 +364,14 @@ fn random_frames_are_finite_and_repeat() {
         );
     }
     assert!(faults.is_empty(), "{} faults of {count}:\n{}", faults.len(), faults.join("\n"));
+}
+
+/// `10000`, or `1700..10000` to go on from a run that was stopped or to share the work.
+fn range_of(text: &str) -> Option<std::ops::Range<u64>> {
+    match text.split_once("..") {
+        Some((first, end)) => Some(first.parse().ok()?..end.parse().ok()?),
+        None => Some(0..text.parse().ok()?),
+    }
 }
 
 fn range_is_loud() -> bool {
