@@ -555,7 +555,8 @@ impl Renderer {
         let times = self.timer.finish(&self.gpu, &mut encoder);
         let submission = self.gpu.queue.submit([encoder.finish()]);
         let triangles = |h: &crate::scene::HeadInstance<'_>| {
-            u64::from(h.head.opaque_triangles) + u64::from(h.head.overlay_triangles)
+            let (opaque, overlay) = h.head.triangle_counts();
+            u64::from(opaque) + u64::from(overlay)
         };
         let stats = FrameStats {
             passes_ms: Vec::new(),

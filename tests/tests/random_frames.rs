@@ -216,7 +216,11 @@ fn settings(methods: &mut Dice, dice: &mut Dice) -> Settings {
     quality.specular = any!(SpecularMethod);
     quality.bounce = any!(BounceMethod);
     // A processor takes over a second for what a graphics card rasterises by compute.
-    quality.raster = if methods.below(8) == 0 { RasterMethod::Compute } else { RasterMethod::Auto };
+    quality.raster = match methods.below(8) {
+        0 => RasterMethod::Compute,
+        1..4 => RasterMethod::Hardware,
+        _ => RasterMethod::Auto,
+    };
     quality.detail = any!(DetailMethod);
     quality.depth_of_field = any!(DepthOfFieldMethod);
     quality.antialias = any!(AntialiasMethod);
@@ -298,17 +302,20 @@ fn drawn(studio: &mut Studio, job: &Job, heads: &[LoadedHead]) -> Result<Vec<Vec
 fn random_frames_are_finite_and_repeat() {
     let Some(mut studio) = can_draw() else { return };
     let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
-    let range = match (number("RUBOR_PROPERTY"), std::env::var("RUBOR_PROPERTIES")) {
-        (Some(one), _) => one..one + 1,
-        (None, Ok(text)) => range_of(&text).expect("RUBOR_PROPERTIES is a number, or two with .. between"),
-        (None, Err(_)) => 0..6,
+    let (range, step) = match (number("RUBOR_PROPERTY"), std::env::var("RUBOR_PROPERTIES")) {
+        (Some(one), _) => (one..one + 1, 1),
+        (None, Ok(text)) => {
+            (range_of(&text).expect("RUBOR_PROPERTIES is a number, or two with .. between"), 1)
+        }
+        // Each with methods of its own.
+        (None, Err(_)) => (0..6 * JOBS_OF_METHODS, JOBS_OF_METHODS as usize),
     };
     let seconds = number("RUBOR_PROPERTY_SECONDS").unwrap_or(u64::MAX);
     let start = std::time::Instant::now();
     let heads = [head()];
     studio.set_heads([&heads[0].head]).expect("the head fits");
     let (mut count, mut refused, mut faults) = (0, 0, Vec::new());
-    for case in range {
+    for case in range.step_by(step) {
         if start.elapsed().as_secs() >= seconds {
             break;
         }

@@ -72,8 +72,7 @@ pub struct HeadOnGpu {
     pub(crate) cut_triangles: u32,
     /// How many of these, the last ones, are seen through where they are not quite opaque.
     pub(crate) see_through_triangles: u32,
-    pub(crate) overlay_triangles: u32,
-    /// How many of these there are before the first strand, and after each.
+    /// Triangles that are blended over the picture: how many there are before the first strand, and after each.
     pub(crate) strand_ends: Vec<u32>,
     pub(crate) shape_count: usize,
     pub(crate) rest: wgpu::Buffer,
@@ -292,7 +291,7 @@ impl HeadOnGpu {
             .enumerate()
             .map(|(i, v)| GpuVertex { point: v.point, u: v.uv.x, v: v.uv.y, bend: bend(i) })
             .collect();
-        let (triangles, [opaque, cut, see_through, overlay]) = ordered_triangles(head);
+        let (triangles, Counts { opaque, cut, see_through, strand_ends }) = ordered_triangles(head);
         let corners = triangles[..opaque as usize].iter().flat_map(|t| &t[..3]);
         let opaque_points: Vec<u32> = corners.map(|v| mesh.vertices[*v as usize].point).collect();
         let (ring_starts, ring) = rings(head, &triangles);
@@ -303,8 +302,7 @@ impl HeadOnGpu {
             opaque_triangles: opaque,
             cut_triangles: cut,
             see_through_triangles: see_through,
-            overlay_triangles: overlay,
-            strand_ends: strands::ordered(head).1,
+            strand_ends,
             shape_count: head.shapes.len(),
             rest: gpu.storage("rest points", &rest),
             delta_starts: gpu.storage("delta starts", &delta_starts),
@@ -337,7 +335,7 @@ impl HeadOnGpu {
 
     /// Triangles that go through the visibility buffer, and those that are blended over the picture.
     pub fn triangle_counts(&self) -> (u32, u32) {
-        (self.opaque_triangles, self.overlay_triangles)
+        (self.opaque_triangles, self.strand_ends.last().copied().unwrap_or(0))
     }
 
     /// Bytes on the device for this head in a scene: [`HeadOnGpu::memory_bytes`] and what frames write of it.
@@ -465,8 +463,18 @@ fn merged_changes(shape: &BlendShape) -> Vec<(u32, Vec3, u32)> {
     }
 }
 
+/// How many triangles of the device's list are of a kind.
+struct Counts {
+    opaque: u32,
+    /// Of these, the last ones: with holes, and of those again the last ones, seen through.
+    cut: u32,
+    see_through: u32,
+    /// As [`strands::ordered`] gives them.
+    strand_ends: Vec<u32>,
+}
+
 /// Triangles of the device's list with the numbers of their material (see `authored.wesl`), and counts as [`triangle_order`].
-fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 4]) {
+fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, Counts) {
     let (order, counts) = triangle_order(head);
     let mut numbers = vec![0; head.mesh.triangles.len()];
     for (index, part) in head.mesh.parts.iter().enumerate() {
@@ -484,15 +492,14 @@ fn ordered_triangles(head: &Head) -> (Vec<[u32; 4]>, [u32; 4]) {
 /// The triangle of `head.mesh` that each number of [`crate::channels::Channel::Ids`] stands for, in frames that draw the whole
 /// head (`--detail full`); the numbers in ids are one larger.
 pub fn triangles_of_ids(head: &Head) -> Vec<u32> {
-    let (mut order, [opaque, ..]) = triangle_order(head);
-    order.truncate(opaque as usize);
+    let (mut order, counts) = triangle_order(head);
+    order.truncate(counts.opaque as usize);
     order
 }
 
 /// Triangles of a head in the order of the device's list: opaque ones first, the last of them those with holes,
-/// of these the last ones those that are seen through; then overlays in the order of [`strands`]; hidden ones are left out. How many are opaque, have
-/// holes, are seen through, and are overlays.
-fn triangle_order(head: &Head) -> (Vec<u32>, [u32; 4]) {
+/// of these the last ones those that are seen through; then overlays in the order of [`strands`]; hidden ones are left out.
+fn triangle_order(head: &Head) -> (Vec<u32>, Counts) {
     // Backs of parts with one side are holes too; skin has two.
     let has_holes = |part: usize| {
         let material = head.needed_material(part).map(|m| &head.authored.materials[m as usize]);
@@ -516,9 +523,9 @@ fn triangle_order(head: &Head) -> (Vec<u32>, [u32; 4]) {
     let solid = triangles.len() as u32;
     triangles.extend(of(&|i, m| m.is_opaque() && is_see_through(i)));
     let opaque = triangles.len() as u32;
-    triangles.extend(strands::ordered(head).0);
-    let overlay = triangles.len() as u32 - opaque;
-    (triangles, [opaque, opaque - whole, opaque - solid, overlay])
+    let (overlays, strand_ends) = strands::ordered(head);
+    triangles.extend(overlays);
+    (triangles, Counts { opaque, cut: opaque - whole, see_through: opaque - solid, strand_ends })
 }
 
 fn index_buffer(gpu: &Gpu, indices: &[u32]) -> wgpu::Buffer {

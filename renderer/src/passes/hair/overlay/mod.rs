@@ -70,7 +70,7 @@ impl Overlay {
         heads: &[PosedHead<'_>],
         onto: Onto<'_>,
     ) {
-        let drawn: Vec<_> = heads.iter().filter(|h| h.head.overlay_triangles > 0).collect();
+        let drawn: Vec<_> = heads.iter().filter(|h| h.head.triangle_counts().1 > 0).collect();
         if drawn.is_empty() {
             return;
         }
