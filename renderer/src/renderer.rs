@@ -47,9 +47,11 @@ pub struct FrameStats {
 
 /// Frames that [`Renderer::measure`] submits before it waits: enough to keep the device busy.
 const FRAMES_IN_FLIGHT: usize = 3;
-/// Frames of [`Renderer::choose_raster`] for each method: those left out, and those whose median counts.
-const WARM_UP: u32 = 3;
-const MEASURED: u32 = 9;
+/// Rounds of [`Renderer::choose_raster`] in which the methods take turns, as a device that just woke up is slow at first; frames of a method in
+/// each: those left out, and those whose median counts.
+const ROUNDS: usize = 3;
+const WARM_UP: u32 = 2;
+const MEASURED: u32 = 5;
 
 /// Draws scenes. Keeps pipelines, images while frames use them, and the history of temporal antialiasing.
 pub struct Renderer {
@@ -381,7 +383,7 @@ impl Renderer {
     }
 
     /// Measures what turns triangles into pixels faster on this device, for a scene, and uses it where the settings say
-    /// [`RasterMethod::Auto`]. A software device is not measured: its raster unit is faster. Begins a new history.
+    /// [`RasterMethod::Auto`]: by the best of some rounds. A software device is not measured: its raster unit is faster. Begins a new history.
     ///
     /// # Errors
     /// As [`Renderer::measure`].
@@ -399,12 +401,14 @@ impl Renderer {
         if matches!(settings.quality.scatter, ScatterMethod::ReferenceSurface(_)) {
             settings.quality.scatter = ScatterMethod::None;
         }
-        for (cost_ms, method) in cost_ms.iter_mut().zip(methods) {
-            settings.quality.raster = method;
+        for turn in 0..ROUNDS * methods.len() {
+            let of = turn % methods.len();
+            settings.quality.raster = methods[of];
             let mut frames: Vec<_> =
                 self.measure(scene, &settings, WARM_UP, MEASURED).await?.iter().map(|t| t.frame_ms).collect();
             frames.sort_by(f64::total_cmp);
-            *cost_ms = frames.get(frames.len() / 2).copied().unwrap_or(f64::INFINITY);
+            let median = frames.get(frames.len() / 2).copied().unwrap_or(f64::INFINITY);
+            cost_ms[of] = cost_ms[of].min(median);
         }
         self.past.forget();
         let (rasteriser, method) = match cost_ms[1] < cost_ms[0] {

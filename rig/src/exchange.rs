@@ -1,19 +1,25 @@
 //! What places of a head see of each other: the ways of light that bounces.
 //!
 //! ```text
-//! points, triangles at rest --median cuts by place and normal--> patches
-//! every point --rays, cosine weighted--> patch that each meets, or none
+//! points, triangles in each pose --rays, cosine weighted--> point that each meets, or none
+//! points that rays meet --cuts by place and normal--> patches
 //! ```
 //!
 //! The light that reaches a point from other places of the head is the mean over cosine-weighted directions of the radiance that
 //! the ray of each meets, `E / pi = (1 / N) sum_k L(patch_k)`: the rendering equation without what the sky sends (Kajiya 1986;
-//! for diffuse surfaces radiosity, Goral et al. 1984). A patch is a few square centimetres of similar normals with one radiance: the
-//! mean over its points. So a shadow's edge is known to a patch, and light that goes on from there is as soft as that.
+//! for diffuse surfaces radiosity, Goral et al. 1984). A patch has one radiance, the mean over its points.
 //!
-//! Rays meet the head at rest. Where a pose opens or closes a cavity, who uses this scales the sum by how much more or less of the
-//! sky a point sees ([`crate::head::BlendShape::occlusion`]).
+//! How wrong that is grows with what differs within a patch and with how many rays of visible places meet it. So the patch that is cut next is
+//! the one whose places and normals differ most, each weighted by the rays that meet it: many small patches in the mouth, behind the ears and beside the nose,
+//! few large ones elsewhere, and none where no ray arrives. Patches of equal numbers of points mixed the front of teeth with their back and both sides
+//! of an ear (`docs/light.md`).
+//!
+//! Rays meet the head in some poses: at rest, and with an open mouth, where a palate does not see the tongue on which it lay. Between such poses, who
+//! uses this scales the sum by how much more or less of the sky a point sees ([`crate::head::BlendShape::occlusion`]).
 //!
 //! Does not: meet parts that are seen through or of hair, carry light between heads.
+
+use std::collections::BinaryHeap;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -26,92 +32,70 @@ pub const RAYS: usize = 32;
 pub const NONE: u16 = u16::MAX;
 /// Patches of a head, at most.
 pub const MOST_PATCHES: usize = 1024;
-/// Points of a patch below which it is not cut.
-const LEAST_POINTS: usize = 12;
 /// Rays start this far off the surface, as part of the head's height: 0.1 mm on an adult head.
 const START: f32 = 3e-4;
-/// Millimetres at which places are as different as unit normals at right angles, as part of the head's height: 15 mm.
+/// Distance at which places are as different as unit normals at right angles, as part of the head's height: 15 mm.
 const NORMAL_SCALE: f32 = 0.05;
 /// Ambient visibility from which a point is not asked for what it sees of the head.
 const OPEN: f32 = 0.995;
+/// What a ray counts that starts where nothing is seen of the sky, beside one that starts in the open.
+const HIDDEN: f32 = 0.02;
+
+/// A surface in one pose.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose<'a> {
+    /// Places, in any unit of length.
+    pub points: &'a [Vec3],
+    /// Ambient visibility of each point, 0 to 1; empty where it is not known.
+    pub visibility: &'a [f32],
+}
 
 /// The ways of light between places of a surface.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Exchange {
     /// First entry of `patch_points` of each patch, and their number.
     pub patch_starts: Vec<u32>,
-    /// Points of the surface, patch by patch.
+    /// Points that rays meet, patch by patch.
     pub patch_points: Vec<u32>,
-    /// [`RAYS`] patches of each point; [`NONE`] where a ray leaves the head.
+    /// [`RAYS`] patches of each point, pose after pose; [`NONE`] where a ray leaves the head.
     pub seen: Vec<u16>,
 }
 
 impl Exchange {
-    /// Traces what each point of a closed or open surface sees of it. Triangles are counter-clockwise seen from outside;
-    /// `visibility` is the ambient visibility of each point, where known.
-    pub fn new(points: &[Vec3], triangles: &[[u32; 3]], visibility: &[f32]) -> Self {
-        let mut normals = vec![Vec3::ZERO; points.len()];
-        let mut is_used = vec![false; points.len()];
-        for t in triangles {
-            let [a, b, c] = t.map(|p| points[p as usize]);
-            for p in t {
-                normals[*p as usize] += (b - a).cross(c - a);
-                is_used[*p as usize] = true;
+    /// Traces what each point of a closed or open surface sees of it in some poses, of which the first says what lies side by side in a patch. Triangles
+    /// are counter-clockwise seen from outside.
+    pub fn new(triangles: &[[u32; 3]], poses: &[Pose<'_>]) -> Self {
+        let Some(first) = poses.first() else {
+            return Self { patch_starts: vec![0], patch_points: Vec::new(), seen: Vec::new() };
+        };
+        let count = first.points.len();
+        let traced: Vec<(Vec<Option<Vec3>>, Vec<u32>)> =
+            poses.iter().map(|pose| traced(triangles, pose)).collect();
+        let mut met = vec![0.0f32; count];
+        for p in 0..count {
+            let known = poses.iter().map(|pose| pose.visibility.get(p).copied().unwrap_or(1.0));
+            let weight = known.fold(HIDDEN, f32::max);
+            for (_, nearest) in &traced {
+                let there = nearest[RAYS * p..RAYS * (p + 1)].iter().filter(|q| **q != NO_POINT);
+                there.for_each(|q| met[*q as usize] += weight);
             }
         }
-        normals.iter_mut().for_each(|n| *n = n.normalize_or(Vec3::Z));
-        let used = (0..points.len() as u32).filter(|p| is_used[*p as usize]);
-        let mut patch_points: Vec<u32> = used.collect();
-        let (low, high) = patch_points
-            .iter()
-            .map(|p| points[*p as usize])
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
-        let height = if patch_points.is_empty() { 1.0 } else { (high - low).y.max(f32::MIN_POSITIVE) };
+        let mut patch_points: Vec<u32> = (0..count as u32).filter(|p| met[*p as usize] > 0.0).collect();
+        let scale = NORMAL_SCALE * height(first.points, &traced[0].0);
         let key = |p: u32| {
-            let (place, normal) = (points[p as usize], NORMAL_SCALE * height * normals[p as usize]);
+            let (place, normal) =
+                (first.points[p as usize], scale * traced[0].0[p as usize].unwrap_or(Vec3::Z));
             [place.x, place.y, place.z, normal.x, normal.y, normal.z]
         };
-        let mut patch_starts = vec![0];
-        cut(&mut patch_points, &key, MOST_PATCHES, 0, &mut patch_starts);
-        let mut patch_of = vec![NONE; points.len()];
+        let patch_starts = cut(&mut patch_points, &key, &met);
+        let mut patch_of = vec![NONE; count];
         for (patch, range) in patch_starts.windows(2).enumerate() {
             for p in &patch_points[range[0] as usize..range[1] as usize] {
                 patch_of[*p as usize] = patch as u16;
             }
         }
-        let bvh = Bvh::new(triangles.iter().map(|t| t.map(|p| points[p as usize])).collect());
-        let near = START * height;
-        let of_point = |p: usize| -> [u16; RAYS] {
-            let mut seen = [NONE; RAYS];
-            if !is_used[p] || visibility.get(p).is_some_and(|v| *v > OPEN) {
-                return seen;
-            }
-            let (normal, turn) = (normals[p], (p as u32).wrapping_mul(0x9E37_79B9) as f32 / 2_f32.powi(32));
-            let origin = points[p] + near * normal;
-            let (tangent, bitangent) = normal.any_orthonormal_pair();
-            for (k, seen) in seen.iter_mut().enumerate() {
-                let direction = cosine_weighted(k, turn);
-                let way = direction.x * tangent + direction.y * bitangent + direction.z * normal;
-                let Some(met) = bvh.first(origin, way, near, f32::INFINITY, None) else { continue };
-                let corners = triangles[met.triangle as usize];
-                let [a, b, c] = corners.map(|p| points[p as usize]);
-                if (b - a).cross(c - a).dot(way) >= 0.0 {
-                    continue;
-                }
-                let [u, v] = met.uv;
-                let w = 1.0 - u - v;
-                let nearest = if u > v && u > w {
-                    1
-                } else if v > w {
-                    2
-                } else {
-                    0
-                };
-                *seen = patch_of[corners[nearest] as usize];
-            }
-            seen
-        };
-        let seen = (0..points.len()).into_par_iter().flat_map_iter(of_point).collect();
+        let patch = |q: &u32| patch_of.get(*q as usize).copied().unwrap_or(NONE);
+        let seen = traced.iter().flat_map(|(_, nearest)| nearest.iter().map(patch)).collect();
         Self { patch_starts, patch_points, seen }
     }
 
@@ -120,7 +104,7 @@ impl Exchange {
         self.patch_starts.len() - 1
     }
 
-    /// Light that reaches each point from the surface, of the radiance of each patch, as radiance of a white surface.
+    /// Light that reaches each point from the surface, pose after pose, of the radiance of each patch, as radiance of a white surface.
     pub fn gathered(&self, radiance: &[Vec3]) -> Vec<Vec3> {
         let of = |seen: &[u16]| {
             let met = seen.iter().filter(|s| **s != NONE);
@@ -139,6 +123,67 @@ impl Exchange {
     }
 }
 
+/// Unit normal of each point that a triangle has; +Z where its triangles have no area.
+fn normals_of(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Option<Vec3>> {
+    let mut sums = vec![None; points.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|p| points[p as usize]);
+        for p in t {
+            *sums[*p as usize].get_or_insert(Vec3::ZERO) += (b - a).cross(c - a);
+        }
+    }
+    sums.into_iter().map(|n| n.map(|n| n.normalize_or(Vec3::Z))).collect()
+}
+
+/// From the lowest to the highest point that a triangle has.
+fn height(points: &[Vec3], normals: &[Option<Vec3>]) -> f32 {
+    let heights = points.iter().zip(normals).filter(|(_, n)| n.is_some()).map(|(p, _)| p.y);
+    let (low, high) = heights.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
+    (high - low).max(f32::MIN_POSITIVE)
+}
+
+/// In place of a point where a ray leaves the surface, or meets it from behind.
+const NO_POINT: u32 = u32::MAX;
+
+/// Normals of points, and the corner nearest to where each of their [`RAYS`] rays meets the surface.
+fn traced(triangles: &[[u32; 3]], pose: &Pose<'_>) -> (Vec<Option<Vec3>>, Vec<u32>) {
+    let Pose { points, visibility } = *pose;
+    let normals = normals_of(points, triangles);
+    let bvh = Bvh::new(triangles.iter().map(|t| t.map(|p| points[p as usize])).collect());
+    let near = START * height(points, &normals);
+    let of_point = |p: usize| -> [u32; RAYS] {
+        let mut nearest = [NO_POINT; RAYS];
+        let Some(normal) = normals[p].filter(|_| visibility.get(p).is_none_or(|v| *v <= OPEN)) else {
+            return nearest;
+        };
+        let turn = (p as u32).wrapping_mul(0x9E37_79B9) as f32 / 2_f32.powi(32);
+        let origin = points[p] + near * normal;
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        for (k, nearest) in nearest.iter_mut().enumerate() {
+            let direction = cosine_weighted(k, turn);
+            let way = direction.x * tangent + direction.y * bitangent + direction.z * normal;
+            let Some(met) = bvh.first(origin, way, near, f32::INFINITY, None) else { continue };
+            let corners = triangles[met.triangle as usize];
+            let [a, b, c] = corners.map(|p| points[p as usize]);
+            if (b - a).cross(c - a).dot(way) >= 0.0 {
+                continue;
+            }
+            let [u, v] = met.uv;
+            let w = 1.0 - u - v;
+            *nearest = corners[if u > v && u > w {
+                1
+            } else if v > w {
+                2
+            } else {
+                0
+            }];
+        }
+        nearest
+    };
+    let nearest = (0..points.len()).into_par_iter().flat_map_iter(of_point).collect();
+    (normals, nearest)
+}
+
 /// Direction `k` of [`RAYS`] about +Z: a Hammersley set, turned by `turn` (of 1) in both coordinates.
 fn cosine_weighted(k: usize, turn: f32) -> Vec3 {
     let u = (k as f32 + (7.31 * turn).fract()) / RAYS as f32;
@@ -147,27 +192,79 @@ fn cosine_weighted(k: usize, turn: f32) -> Vec3 {
     Vec3::new(r * phi.cos(), r * phi.sin(), z)
 }
 
-/// Cuts points in halves across the longest side of their keys until there are `parts`, and adds the end of each.
-fn cut(points: &mut [u32], key: &impl Fn(u32) -> [f32; 6], parts: usize, start: u32, ends: &mut Vec<u32>) {
-    if parts < 2 || points.len() < 2 * LEAST_POINTS {
-        if !points.is_empty() {
-            ends.push(start + points.len() as u32);
+/// A range of points, and how far their keys are apart: the sum of weighted squares of distances to their mean.
+struct Cell {
+    start: usize,
+    end: usize,
+    spread: f32,
+    /// Across which coordinate they are apart most, and their mean there.
+    axis: usize,
+    mean: f32,
+}
+
+impl Cell {
+    fn of(points: &[u32], start: usize, key: &impl Fn(u32) -> [f32; 6], weights: &[f32]) -> Self {
+        let (mut sum, mut sums) = (0.0f64, [[0.0f64; 2]; 6]);
+        for p in points {
+            let weight = f64::from(weights[*p as usize]);
+            sum += weight;
+            for (k, [once, square]) in key(*p).into_iter().zip(&mut sums) {
+                *once += weight * f64::from(k);
+                *square += weight * f64::from(k) * f64::from(k);
+            }
         }
-        return;
+        let spreads = sums.map(|[once, square]| (square - once * once / sum).max(0.0));
+        let axis = (1..6).fold(0, |best, i| if spreads[i] > spreads[best] { i } else { best });
+        let spread = spreads.iter().sum::<f64>() as f32;
+        Self { start, end: start + points.len(), spread, axis, mean: (sums[axis][0] / sum) as f32 }
     }
-    let (mut low, mut high) = ([f32::INFINITY; 6], [f32::NEG_INFINITY; 6]);
-    for p in points.iter() {
-        for (i, k) in key(*p).into_iter().enumerate() {
-            (low[i], high[i]) = (low[i].min(k), high[i].max(k));
+}
+
+impl PartialEq for Cell {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Cell {}
+
+impl PartialOrd for Cell {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Cell {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.spread.total_cmp(&other.spread).then(other.start.cmp(&self.start))
+    }
+}
+
+/// Cuts points into at most [`MOST_PATCHES`] patches, the one that is apart most each time, and returns where each starts and the last one ends.
+fn cut(points: &mut [u32], key: &impl Fn(u32) -> [f32; 6], weights: &[f32]) -> Vec<u32> {
+    let mut whole = Vec::new();
+    let mut waiting = BinaryHeap::new();
+    if !points.is_empty() {
+        waiting.push(Cell::of(points, 0, key, weights));
+    }
+    while whole.len() + waiting.len() < MOST_PATCHES {
+        let Some(cell) = waiting.pop() else { break };
+        let of_cell = &mut points[cell.start..cell.end];
+        of_cell.sort_by(|a, b| key(*a)[cell.axis].total_cmp(&key(*b)[cell.axis]).then(a.cmp(b)));
+        let middle = of_cell.partition_point(|p| key(*p)[cell.axis] < cell.mean);
+        if middle == 0 || middle == of_cell.len() {
+            // All at one place.
+            whole.push(cell);
+            continue;
         }
+        let (low, high) = of_cell.split_at(middle);
+        waiting.push(Cell::of(low, cell.start, key, weights));
+        waiting.push(Cell::of(high, cell.start + middle, key, weights));
     }
-    let longest = (0..6).fold(0, |best, i| if high[i] - low[i] > high[best] - low[best] { i } else { best });
-    let middle = points.len() / 2;
-    points
-        .select_nth_unstable_by(middle, |a, b| key(*a)[longest].total_cmp(&key(*b)[longest]).then(a.cmp(b)));
-    let (first, second) = points.split_at_mut(middle);
-    cut(first, key, parts / 2, start, ends);
-    cut(second, key, parts / 2, start + middle as u32, ends);
+    let mut starts: Vec<u32> = whole.iter().chain(&waiting).map(|cell| cell.start as u32).collect();
+    starts.sort_unstable();
+    starts.push(points.len() as u32);
+    starts
 }
 
 #[cfg(test)]
@@ -196,17 +293,14 @@ mod tests {
         const N: u32 = 24;
         grid(N, 0.0, true, &mut points, &mut triangles);
         grid(N, 1.0, false, &mut points, &mut triangles);
-        let exchange = Exchange::new(&points, &triangles, &[]);
+        let exchange = Exchange::new(&triangles, &[Pose { points: &points, visibility: &[] }]);
         assert!(exchange.patches() <= MOST_PATCHES);
-        assert_eq!(exchange.patch_points.len(), points.len());
         // The lower square shines.
         let half = points.len() / 2;
         let shining: Vec<Vec3> =
             (0..points.len()).map(|p| if p < half { Vec3::ONE } else { Vec3::ZERO }).collect();
         let patches = exchange.averaged(&shining);
-        // Cuts by halves leave a patch or two with points of both.
-        let mixed = patches.iter().filter(|v| v.x > 0.0 && v.x < 1.0).count();
-        assert!(20 * mixed < patches.len(), "{mixed} of {}", patches.len());
+        assert!(patches.iter().all(|v| v.x == 0.0 || v.x == 1.0), "a patch has points of both");
         let found = exchange.gathered(&patches);
         let mean = |range: std::ops::Range<usize>| {
             found[range.clone()].iter().map(|v| v.x).sum::<f32>() / range.len() as f32
@@ -229,16 +323,54 @@ mod tests {
         grid(4, 0.0, true, &mut points, &mut triangles);
         // Faces away from the first.
         grid(4, 1.0, true, &mut points, &mut triangles);
-        let exchange = Exchange::new(&points, &triangles, &[]);
+        let of = |points: &[Vec3], triangles: &[[u32; 3]], visibility: &[f32]| {
+            Exchange::new(triangles, &[Pose { points, visibility }])
+        };
+        let exchange = of(&points, &triangles, &[]);
         assert!(exchange.seen.iter().all(|s| *s == NONE));
+        assert_eq!(exchange.patches(), 0, "no ray meets anything");
         let (mut points, mut triangles) = (Vec::new(), Vec::new());
         grid(4, 0.0, true, &mut points, &mut triangles);
         grid(4, 0.3, false, &mut points, &mut triangles);
-        let some = Exchange::new(&points, &triangles, &[]);
+        let some = of(&points, &triangles, &[]);
         assert!(some.seen.iter().any(|s| *s != NONE));
-        let open = Exchange::new(&points, &triangles, &vec![1.0; points.len()]);
+        let open = of(&points, &triangles, &vec![1.0; points.len()]);
         assert!(open.seen.iter().all(|s| *s == NONE));
-        let none = Exchange::new(&[], &[], &[]);
+        let none = of(&[], &[], &[]);
         assert_eq!((none.patches(), none.seen.len()), (0, 0));
+    }
+
+    #[test]
+    fn both_sides_of_a_thin_plate_are_in_patches_of_their_own() {
+        // A plate as thin as a tooth between two others, so that rays meet both of its sides.
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        const N: u32 = 40;
+        for (y, up) in [(0.0, true), (0.3, false), (0.302, true), (0.6, false)] {
+            grid(N, y, up, &mut points, &mut triangles);
+        }
+        let exchange = Exchange::new(&triangles, &[Pose { points: &points, visibility: &[] }]);
+        let side = |p: u32| p / ((N + 1) * (N + 1));
+        for range in exchange.patch_starts.windows(2) {
+            let of_patch = &exchange.patch_points[range[0] as usize..range[1] as usize];
+            assert!(of_patch.iter().all(|p| side(*p) == side(of_patch[0])), "{of_patch:?}");
+        }
+        assert!(exchange.patches() > MOST_PATCHES / 2, "{}", exchange.patches());
+    }
+
+    #[test]
+    fn every_pose_has_ways_of_its_own() {
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        grid(8, 0.0, true, &mut points, &mut triangles);
+        grid(8, 0.1, false, &mut points, &mut triangles);
+        let far: Vec<Vec3> =
+            points.iter().map(|p| if p.y > 0.0 { *p + 100.0 * Vec3::Y } else { *p }).collect();
+        let pose = |points| Pose { points, visibility: &[] };
+        let exchange = Exchange::new(&triangles, &[pose(&points), pose(&far)]);
+        let (near, away) = exchange.seen.split_at(RAYS * points.len());
+        let met = |seen: &[u16]| seen.iter().filter(|s| **s != NONE).count();
+        let alone = Exchange::new(&triangles, &[pose(&points)]);
+        let light = |e: &Exchange| e.gathered(&vec![Vec3::ONE; e.patches()])[..points.len()].to_vec();
+        assert_eq!(light(&exchange), light(&alone));
+        assert!(met(near) > near.len() / 2 && met(away) < away.len() / 50, "{} {}", met(near), met(away));
     }
 }

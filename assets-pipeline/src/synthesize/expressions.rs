@@ -37,7 +37,7 @@ const STATES: [State; 9] = [
         everywhere: 0.0,
         // The cheek is lifted against the bone; lips and the fold's rim are stretched thin.
         change: |r| {
-            0.34 * r.cheek_bone + 0.36 * r.cheek - 0.20 * r.lips - 0.10 * r.upper_lip - 0.12 * r.chin
+            0.10 * r.cheek_bone + 0.46 * r.cheek - 0.20 * r.lips - 0.10 * r.upper_lip - 0.12 * r.chin
                 + 0.05 * r.nose_wing
                 - 0.10 * r.under_eye
         },

@@ -115,6 +115,32 @@ pub(crate) struct Surface {
     pub(crate) vertices: Vec<Vertex>,
     /// Three vertices and the number of the material, in the order of the device's list.
     pub(crate) triangles: Vec<[u32; 4]>,
+    /// With a wide open mouth, where the head can open it.
+    pub(crate) opened: Option<Opened>,
+}
+
+/// The points of a surface while one shape has all its weight.
+pub(crate) struct Opened {
+    /// Number of the shape.
+    pub(crate) shape: usize,
+    pub(crate) points: Vec<Vec3>,
+    /// As [`Surface::visibility`].
+    pub(crate) visibility: Vec<f32>,
+}
+
+/// The shape that opens the mouth.
+const OPENS_MOUTH: &str = "jawOpen";
+
+fn opened(head: &Head) -> Option<Opened> {
+    let shape = head.shapes.iter().position(|s| s.name == OPENS_MOUTH)?;
+    let mut weights = vec![0.0; head.shapes.len()];
+    weights[shape] = 1.0;
+    let points = rubor_rig::deform::deform_points(&head.mesh, &head.shapes, &weights);
+    let known = !head.mesh.occlusion.is_empty();
+    let visibility = known
+        .then(|| rubor_rig::deform::blend_occlusion(&head.mesh, &head.shapes, &weights))
+        .unwrap_or_default();
+    Some(Opened { shape, points, visibility })
 }
 
 type MakeLevels = Box<dyn Fn(&Head) -> Vec<Level> + Send + Sync>;
@@ -325,6 +351,7 @@ impl HeadOnGpu {
                 visibility: mesh.occlusion.clone(),
                 vertices: mesh.vertices.clone(),
                 triangles: triangles[..opaque as usize].to_vec(),
+                opened: opened(head),
             }),
             ways: OnceLock::new(),
             family: Arc::default(),

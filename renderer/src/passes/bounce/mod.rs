@@ -1,20 +1,21 @@
 //! Light that the head sends to itself: the neck lights the chin, one wall of a cavity the other.
 //!
 //! ```text
-//! lamps, shadows, sky --emit--> radiance of each patch --send_on--> what patches send on of that
-//!        --gather--> light of all bounces on each point --smooth--> bounced
+//! lamps, shadows, sky --emit--> radiance of each patch --send_on--> radiance with all bounces
+//!        --gather--> light on each point --smooth--> bounced
 //! ```
 //!
 //! Theory: radiosity (Goral et al. 1984) by what rays of each point meet at rest ([`rubor_rig::exchange`]). Eight points of each patch are lit as
 //! `shade` lights a pixel, without the highlight; patches of some square centimetres have the mean radiance of these; the
-//! light on a point is the mean over its rays of the patches that they meet. A second round lights patches by the first. Each further one
-//! is about as much weaker as the second is than the first, so the sum of all is `b1 + b2 / (1 - b2 / b1)`.
+//! light on a point is the mean over its rays of the patches that they meet. What a patch sends on is `albedo b / (1 - albedo h)`: its first bounce `b`
+//! is traced, and further ones are as if all that it sees sent as much as itself, where `h` is the part of the sky that is hidden. In a closed
+//! cavity of one radiance that is the whole series; where the light comes in at one end, what bounces deeper takes more steps than that.
 //!
 //! `shade` adds it to the light of the sky. That had a guess of light between the walls of a cavity (Jimenez et al. 2016), which
 //! frames without this pass still have.
 //!
-//! The rays are those of the head at rest. In a pose the sum is scaled by what a point sees less of the sky: an open jaw shows the
-//! palate more sky and less tongue.
+//! The rays are those of the head at rest and, by the weight of `jawOpen`, those of the head with an open mouth: there the palate does not see the tongue
+//! on which it lay. In any other pose each sum is scaled by how much more or less of the sky a point sees than where its rays were traced.
 //!
 //! Inputs: what `shade` binds; frames and visibility of the pose. Output: radiance of a white surface at each point, linear
 //! Rec. 709, `vec4f`.
@@ -28,7 +29,7 @@
 #[cfg(test)]
 mod tests;
 
-use rubor_rig::exchange::{Exchange, MOST_PATCHES, RAYS};
+use rubor_rig::exchange::{Exchange, MOST_PATCHES, Pose, RAYS};
 
 use crate::device::kernel::Resource;
 use crate::device::wgsl::{Module, Program, module};
@@ -65,19 +66,25 @@ const NO_POINT: u32 = u32::MAX;
 pub(crate) struct Ways {
     /// [`EMITTERS`] of each patch.
     emitters: wgpu::Buffer,
+    /// At rest, then with an open mouth where the head can open it.
     ways: wgpu::Buffer,
+    /// Ambient visibility of each point in the same poses.
+    visibility: wgpu::Buffer,
     neighbour_starts: wgpu::Buffer,
     neighbours: wgpu::Buffer,
     patch_count: u32,
 }
 
 impl Ways {
-    /// Traces rays from the points of a surface at rest, whose ambient visibility is known.
+    /// Traces rays from the points of a surface, whose ambient visibility is known.
     pub(crate) fn new(gpu: &Gpu, surface: &Surface) -> Self {
         let point = |v: u32| surface.vertices[v as usize].point;
         let triangles: Vec<[u32; 3]> =
             surface.triangles.iter().map(|[a, b, c, _]| [point(*a), point(*b), point(*c)]).collect();
-        let exchange = Exchange::new(&surface.points, &triangles, &surface.visibility);
+        let opened = surface.opened.as_ref();
+        let mut poses = vec![Pose { points: &surface.points, visibility: &surface.visibility }];
+        poses.extend(opened.map(|o| Pose { points: &o.points, visibility: &o.visibility }));
+        let exchange = Exchange::new(&triangles, &poses);
         let mut corner_of_point = vec![u32::MAX; surface.points.len()];
         for (t, corners) in triangles.iter().enumerate() {
             for (k, p) in corners.iter().enumerate() {
@@ -86,6 +93,9 @@ impl Ways {
         }
         let words: Vec<u32> =
             exchange.seen.chunks_exact(2).map(|w| u32::from(w[0]) | u32::from(w[1]) << 16).collect();
+        let known = |p: usize, pose: &Pose<'_>| pose.visibility.get(p).copied().unwrap_or(1.0);
+        let visibility: Vec<f32> =
+            poses.iter().flat_map(|pose| (0..pose.points.len()).map(|p| known(p, pose))).collect();
         const { assert!(RAYS == 32, "bounce.wesl has four invocations read eight each") };
         let mut emitters: Vec<[u32; 2]> = Vec::new();
         for range in exchange.patch_starts.windows(2) {
@@ -98,6 +108,7 @@ impl Ways {
         Self {
             emitters: gpu.storage("emitting points", &emitters),
             ways: gpu.storage("ways of light", &words),
+            visibility: gpu.storage("visibility along them", &visibility),
             neighbour_starts: gpu.storage("neighbour starts", &neighbour_starts),
             neighbours: gpu.storage("neighbours", &neighbours),
             patch_count: exchange.patches() as u32,
@@ -106,7 +117,8 @@ impl Ways {
 
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
-        let buffers = [&self.emitters, &self.ways, &self.neighbour_starts, &self.neighbours];
+        let buffers =
+            [&self.emitters, &self.ways, &self.visibility, &self.neighbour_starts, &self.neighbours];
         buffers.into_iter().map(|b| b.size()).sum()
     }
 }
@@ -150,9 +162,9 @@ fn add(row: &mut Vec<(u32, f32)>, point: u32, weight: f32) {
 pub(crate) struct Bouncing {
     /// Of emitters, 8 bits each.
     albedos: wgpu::Buffer,
-    /// Radiance of patches.
+    /// Radiance of patches by lamps and sky, and with all bounces.
     sent: wgpu::Buffer,
-    sent_on: wgpu::Buffer,
+    sent_in_all: wgpu::Buffer,
     /// Light on points before it is smoothed.
     arrived: wgpu::Buffer,
 }
@@ -165,7 +177,7 @@ impl Bouncing {
         Self {
             albedos: gpu.storage_zeroed("albedos of emitters", 4 * u64::from(EMITTERS) * MOST),
             sent: gpu.storage_zeroed("light of patches", 16 * MOST),
-            sent_on: gpu.storage_zeroed("light that patches send on", 16 * MOST),
+            sent_in_all: gpu.storage_zeroed("light of patches in all", 16 * MOST),
             arrived: gpu.storage_zeroed("light on points", 16 * u64::from(points)),
         }
     }
@@ -177,7 +189,7 @@ impl Bouncing {
 
     /// Bytes on the device.
     pub(crate) fn bytes(&self) -> u64 {
-        [&self.albedos, &self.sent, &self.sent_on, &self.arrived].into_iter().map(|b| b.size()).sum()
+        [&self.albedos, &self.sent, &self.sent_in_all, &self.arrived].into_iter().map(|b| b.size()).sum()
     }
 }
 
@@ -190,13 +202,31 @@ pub(crate) struct Bounce {
     emitters_of_group: u32,
 }
 
+/// Parts that the traced poses have in the one of a frame.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Poses {
+    /// Rest, and an open mouth.
+    weights: [f32; 2],
+    point_count: u32,
+    padding: u32,
+}
+
+impl Poses {
+    fn of(head: &PosedHead<'_>) -> Self {
+        let opened = head.head.surface.opened.as_ref();
+        let open = opened.map_or(0.0, |o| head.state.shapes[o.shape].clamp(0.0, 1.0));
+        Self { weights: [1.0 - open, open], point_count: head.head.point_count, padding: 0 }
+    }
+}
+
 /// What a head binds while patches send light to points.
-fn between<'a>(head: &PosedHead<'a>, ways: &'a Ways) -> Vec<Resource<'a>> {
+fn between<'a>(head: &PosedHead<'a>, ways: &'a Ways, poses: &'a wgpu::Buffer) -> Vec<Resource<'a>> {
     vec![
+        ("poses", poses.bound()),
         ("ways", ways.ways.bound()),
-        ("rest", head.head.rest.bound()),
+        ("visibility", ways.visibility.bound()),
         ("positions", head.positions.bound()),
-        ("sent", head.bouncing.sent.bound()),
     ]
 }
 
@@ -234,11 +264,11 @@ impl Bounce {
                 // Cavities have no guess of the light that this finds.
                 let mut params = shade::params(lighting, head);
                 params.skin_flags |= shade::BOUNCES;
-                (head, ways, r.uniform("bounce", &params))
+                (head, ways, r.uniform("bounce", &params), r.uniform("traced poses", &Poses::of(head)))
             })
             .collect();
         let groups = |n: u32, each: u32| [n.div_ceil(each), 1, 1];
-        let lamps = heads.iter().map(|(head, ways, params)| {
+        let lamps = heads.iter().map(|(head, ways, params, _)| {
             let mut resources = shade.resources(lighting, head, params);
             resources.extend([
                 ("emitters", ways.emitters.bound()),
@@ -248,26 +278,27 @@ impl Bounce {
             (resources, groups(EMITTERS * ways.patch_count, self.emitters_of_group))
         });
         r.dispatch_each(&self.emit, lamps);
-        let on = heads.iter().map(|(head, ways, _)| {
-            let mut resources = between(head, ways);
+        let on = heads.iter().map(|(head, ways, _, poses)| {
+            let mut resources = between(head, ways, poses);
             resources.extend([
                 ("emitters", ways.emitters.bound()),
                 ("albedos", head.bouncing.albedos.bound()),
-                ("sent_on_out", head.bouncing.sent_on.bound()),
+                ("sent", head.bouncing.sent.bound()),
+                ("sent_out", head.bouncing.sent_in_all.bound()),
             ]);
             (resources, groups(SHARES * EMITTERS * ways.patch_count, THREADS))
         });
         r.dispatch_each(&self.send_on, on);
-        let gathered = heads.iter().map(|(head, ways, _)| {
-            let mut resources = between(head, ways);
+        let gathered = heads.iter().map(|(head, ways, _, poses)| {
+            let mut resources = between(head, ways, poses);
             resources.extend([
-                ("sent_on", head.bouncing.sent_on.bound()),
+                ("sent", head.bouncing.sent_in_all.bound()),
                 ("arrived_out", head.bouncing.arrived.bound()),
             ]);
             (resources, groups(SHARES * head.head.point_count, THREADS))
         });
         r.dispatch_each(&self.gather, gathered);
-        let smoothed = heads.iter().map(|(head, ways, _)| {
+        let smoothed = heads.iter().map(|(head, ways, ..)| {
             let resources = vec![
                 ("neighbour_starts", ways.neighbour_starts.bound()),
                 ("neighbours", ways.neighbours.bound()),

@@ -279,7 +279,11 @@ impl ComputeRaster {
         r.dispatch_each(&fill.each, each);
         let large = drawn.iter().map(|(resources, _)| (resources.clone(), [LARGE_GROUPS, 1, 1]));
         r.dispatch_each(&fill.large, large);
-        let rest = drawn.into_iter().map(|(resources, count)| (resources, [count.div_ceil(64), layers, 1]));
+        // A list with room for every triangle is never too short.
+        let rest = drawn
+            .into_iter()
+            .filter(|(_, count)| count * layers > LARGE_CAPACITY)
+            .map(|(resources, count)| (resources, [count.div_ceil(64), layers, 1]));
         r.dispatch_each(&fill.rest, rest);
     }
 
