@@ -50,7 +50,7 @@ figures: driver
 	$(CARGO) run --release --locked -- chart --stability --output $(FIGURES)
 
 check-hardening: driver
-	$(CARGO) build --release --locked -p rubor
+	$(CARGO) build --release --locked --workspace --bin rubor
 	CARGO="$(CARGO)" sh tools/check-hardening.sh
 
 fuzz:

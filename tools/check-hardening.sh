@@ -22,16 +22,17 @@ env_step() {
 }
 echo "device: $("${CARGO_TARGET_DIR:-target}"/release/rubor adapters 2>/dev/null | head -1)"
 echo "date: $(date -u +%Y-%m-%d), $(nproc) cores"
-test="$cargo test --release --locked -p rubor"
+# Of the whole workspace, so that every step uses the crates of one build.
+test="$cargo test --release --locked --workspace"
 # Up to 5 minutes, 4, 1, 2, 3, 2.
 env_step "hostile files" "RUBOR_HOSTILE=all" $test --test hostile -- --nocapture
 env_step "kill -9" "RUBOR_KILLS=${KILLS:-34}" $test --test folders -- --nocapture --ignored
 step "folders" $test --test folders --test frames
 step "openjd" sh tests/openjd/run.sh "${CARGO_TARGET_DIR:-target}/release/rubor"
 env_step "random frames" "RUBOR_PROPERTIES=10000 RUBOR_PROPERTY_SECONDS=${PROPERTY_SECONDS:-180}" \
-    $cargo test --release --locked -p rubor-tests --test random_frames -- --nocapture
+    $test --test random_frames -- --nocapture
 step "fuzzing" sh -c "cd tests/fuzz && CARGO_TARGET_DIR=\${CARGO_TARGET_DIR:-target} $cargo run --release --quiet -- all --seconds ${FUZZ_SECONDS:-8}"
-step "memory per frame" $cargo test --release --locked -p rubor-renderer --test memory
+step "memory per frame" $test --test memory
 if $cargo deny --version >/dev/null 2>&1; then step "cargo deny" $cargo deny --log-level error check; else echo "SKIPPED: cargo-deny is not installed"; fi
 echo
 echo "$faults faults"
