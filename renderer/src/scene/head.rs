@@ -136,10 +136,10 @@ fn opened(head: &Head) -> Option<Opened> {
     let mut weights = vec![0.0; head.shapes.len()];
     weights[shape] = 1.0;
     let points = rubor_rig::deform::deform_points(&head.mesh, &head.shapes, &weights);
-    let known = !head.mesh.occlusion.is_empty();
-    let visibility = known
-        .then(|| rubor_rig::deform::blend_occlusion(&head.mesh, &head.shapes, &weights))
-        .unwrap_or_default();
+    let visibility = match head.mesh.occlusion.is_empty() {
+        true => Vec::new(),
+        false => rubor_rig::deform::blend_occlusion(&head.mesh, &head.shapes, &weights),
+    };
     Some(Opened { shape, points, visibility })
 }
 
