@@ -12,7 +12,7 @@ use crate::channels::{CHANNELS, Channel, ChannelData};
 use crate::device::native;
 use crate::passes::geometry::{morph, shadow, surface_data, tangent_frames, velocity, visibility};
 use crate::passes::hair::overlay;
-use crate::passes::{appearance, bounce, compose, resolve, see_through, shade};
+use crate::passes::{appearance, compose, resolve, see_through, shade};
 use crate::scene::authored::{GpuAuthoredVertex, GpuMaterial, GpuTexture};
 use crate::scene::head::GpuVertex;
 use crate::scene::lamp::GpuLight;
@@ -45,13 +45,6 @@ fn shaders_are_valid_and_have_the_workgroups_that_dispatches_count_on() {
         assert_workgroups(&shade::authored_program(), &square(entry));
     }
     assert_workgroups(&shade::through_program(), &square("through"));
-    for shares_lamps in [false, true] {
-        assert_workgroups(&bounce::emit_program(shares_lamps), &line("emit"));
-    }
-    for entry in ["send_on", "gather"] {
-        assert_workgroups(&bounce::bounce_program(), &line(entry));
-    }
-    assert_workgroups(&bounce::smooth_program(), &line("smooth_light"));
     assert_workgroups(&see_through::behind_program(), &square("behind"));
     assert_raster(&see_through::layer_program(), &["layer_vertex", "layer_fragment"]);
     for hair in [false, true] {

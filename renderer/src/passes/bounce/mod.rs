@@ -5,11 +5,11 @@
 //!        --gather--> light on each point --smooth--> bounced
 //! ```
 //!
-//! Theory: radiosity (Goral et al. 1984) by what rays of each point meet at rest ([`rubor_rig::exchange`]). Eight points of each patch are lit as
-//! `shade` lights a pixel, without the highlight; patches of some square centimetres have the mean radiance of these; the
-//! light on a point is the mean over its rays of the patches that they meet. What a patch sends on is `albedo b / (1 - albedo h)`: its first bounce `b`
-//! is traced, and further ones are as if all that it sees sent as much as itself, where `h` is the part of the sky that is hidden. In a closed
-//! cavity of one radiance that is the whole series; where the light comes in at one end, what bounces deeper takes more steps than that.
+//! Theory: radiosity (Goral et al. 1984) along the rays of each point ([`rubor_rig::exchange`]). Up to eight points of each patch are lit as `shade` lights
+//! a pixel, without the highlight; the patch has their mean radiance. The light on a point is the mean over its rays of the patches that they meet.
+//! A patch sends on `albedo b / (1 - albedo h)` of the light `b` that other patches send to it: that first bounce is traced, and further ones are taken as if
+//! all that the patch sees sent as much as itself, where `h` is the part of the sky that is hidden. In a closed cavity of one radiance this is the whole
+//! series.
 //!
 //! `shade` adds it to the light of the sky. That had a guess of light between the walls of a cavity (Jimenez et al. 2016), which
 //! frames without this pass still have.

@@ -1,4 +1,4 @@
-//! Light between two squares, from form factors.
+//! Light between two squares, from form factors, and in a ball, from the integrating sphere.
 
 use std::f64::consts::PI;
 
@@ -6,16 +6,70 @@ use glam::{Mat4, Vec2, Vec3};
 use rubor_rig::face_state::FaceState;
 use rubor_rig::head::{BlendShape, Head, Material, Mesh, Part, Vertex};
 
+use super::{Poses, bounce_program, emit_program, smooth_program};
 use crate::channels::Channel;
 use crate::passes::shade::directional_albedo::entering;
 use crate::settings::{
     AntialiasMethod, BounceMethod, Look, Output, Quality, ScatterMethod, Settings, TransmitMethod,
 };
-use crate::testing::own_gpu;
+use crate::testing::{assert_layout, assert_workgroups, offsets, own_gpu};
 use crate::tests::{read_texels, render};
 use crate::{Camera, ColorTable, HeadInstance, HeadOnGpu, Light, LightKind, Renderer, Scene};
 
 const MM: f32 = 1e-3;
+
+#[test]
+fn shaders_and_layouts_match() {
+    for shares_lamps in [false, true] {
+        assert_workgroups(&emit_program(shares_lamps), &[("emit", [64, 1, 1])]);
+    }
+    let program = bounce_program();
+    for entry in ["send_on", "gather"] {
+        assert_workgroups(&program, &[(entry, [64, 1, 1])]);
+    }
+    assert_workgroups(&smooth_program(), &[("smooth_light", [64, 1, 1])]);
+    let poses = offsets!(Poses; weights as "weights", point_count as "point_count");
+    assert_layout(&program, "gather", "Poses", size_of::<Poses>(), &poses);
+}
+
+/// Diffuse light of a head without maps whose skin has an albedo, 9 by 9 pixels.
+fn diffuse(
+    bounce: BounceMethod,
+    head: &Head,
+    weights: &[f32],
+    albedo: [f32; 3],
+    lamp: Light,
+    camera: Camera,
+) -> Option<Vec<[f32; 4]>> {
+    let mut renderer = Renderer::new(own_gpu()?).expect("a renderer");
+    let color = ColorTable { width: 1, height: 1, texels: &[albedo] };
+    let on_gpu = HeadOnGpu::new(renderer.gpu(), head, &color).expect("it uploads");
+    let state = FaceState { shapes: weights.to_vec(), ..FaceState::neutral(head) };
+    let scene = Scene {
+        heads: &[HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }],
+        camera,
+        lights: &[lamp],
+        environment: None,
+        environment_rotation: 0.0,
+        environment_intensity: 1.0,
+        background_linear: Vec3::ZERO,
+        optics: Default::default(),
+    };
+    let settings = Settings {
+        output: Output { size: [9; 2], channels: vec![Channel::Diffuse], ..Output::default() },
+        quality: Quality {
+            scatter: ScatterMethod::None,
+            transmit: TransmitMethod::None,
+            bounce,
+            antialias: AntialiasMethod::None,
+            ..Quality::default()
+        },
+        look: Look::default(),
+    };
+    render(&mut renderer, &scene, &settings).expect("it draws");
+    Some(read_texels(&renderer, Channel::Diffuse))
+}
+
 const CELLS: u32 = 24;
 
 /// Squares of 200 mm: one at z = 0 that faces +Z, one at z = 100 mm that faces it, and that `jawOpen` moves to z = 200 mm.
@@ -47,40 +101,14 @@ fn squares(visibility: f32) -> Head {
 
 /// Diffuse light of the lower square, seen from between both, while a lamp lights the upper one, which is moved by a weight.
 fn lower_square(bounce: BounceMethod, visibility: f32, moved: f32) -> Option<Vec<[f32; 4]>> {
-    let mut renderer = Renderer::new(own_gpu()?).expect("a renderer");
-    let color = ColorTable { width: 1, height: 1, texels: &[[0.6, 0.4, 0.2]] };
-    let head = squares(visibility);
-    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &color).expect("it uploads");
-    let state = FaceState { shapes: vec![moved], ..FaceState::neutral(&head) };
     let lamp = Light {
         kind: LightKind::Directional { direction: Vec3::Z },
         color_linear: Vec3::splat(2.0),
         radius: 0.0,
         casts_shadow: false,
     };
-    let scene = Scene {
-        heads: &[HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }],
-        camera: Camera { position: 0.03 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 },
-        lights: &[lamp],
-        environment: None,
-        environment_rotation: 0.0,
-        environment_intensity: 1.0,
-        background_linear: Vec3::ZERO,
-        optics: Default::default(),
-    };
-    let settings = Settings {
-        output: Output { size: [9; 2], channels: vec![Channel::Diffuse], ..Output::default() },
-        quality: Quality {
-            scatter: ScatterMethod::None,
-            transmit: TransmitMethod::None,
-            bounce,
-            antialias: AntialiasMethod::None,
-            ..Quality::default()
-        },
-        look: Look::default(),
-    };
-    render(&mut renderer, &scene, &settings).expect("it draws");
-    Some(read_texels(&renderer, Channel::Diffuse))
+    let camera = Camera { position: 0.03 * Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, fov_degrees: 20.0 };
+    diffuse(bounce, &squares(visibility), &[moved], [0.6, 0.4, 0.2], lamp, camera)
 }
 
 /// Form factor of a square of 200 mm for an element over its middle, `z` mm away: four quarters of (1 / 2 pi) 2 a atan(a) with
@@ -128,8 +156,6 @@ fn without_the_pass_or_with_nothing_hidden_there_is_none() {
 
 /// A hollow ball of 100 mm, seen and lit from its middle; `albedo` of its skin.
 fn inside_of_a_ball(bounce: BounceMethod, albedo: [f32; 3]) -> Option<[f32; 3]> {
-    let mut renderer = Renderer::new(own_gpu()?).expect("a renderer");
-    let color = ColorTable { width: 1, height: 1, texels: &[albedo] };
     const RINGS: u32 = 24;
     const AROUND: u32 = 2 * RINGS;
     let mut mesh = Mesh::default();
@@ -153,37 +179,14 @@ fn inside_of_a_ball(bounce: BounceMethod, albedo: [f32; 3]) -> Option<[f32; 3]> 
     });
     mesh.occlusion = vec![0.0; mesh.points.len()];
     let head = Head { name: "ball".into(), mesh, ..Head::default() };
-    let on_gpu = HeadOnGpu::new(renderer.gpu(), &head, &color).expect("it uploads");
-    let state = FaceState::neutral(&head);
     let lamp = Light {
         kind: LightKind::Point { position: Vec3::ZERO },
         color_linear: Vec3::ONE,
         radius: 0.0,
         casts_shadow: false,
     };
-    let scene = Scene {
-        heads: &[HeadInstance { head: &on_gpu, state: &state, world_from_head: Mat4::IDENTITY }],
-        camera: Camera { position: Vec3::ZERO, target: Vec3::Z, up: Vec3::Y, fov_degrees: 20.0 },
-        lights: &[lamp],
-        environment: None,
-        environment_rotation: 0.0,
-        environment_intensity: 1.0,
-        background_linear: Vec3::ZERO,
-        optics: Default::default(),
-    };
-    let settings = Settings {
-        output: Output { size: [9; 2], channels: vec![Channel::Diffuse], ..Output::default() },
-        quality: Quality {
-            scatter: ScatterMethod::None,
-            transmit: TransmitMethod::None,
-            bounce,
-            antialias: AntialiasMethod::None,
-            ..Quality::default()
-        },
-        look: Look::default(),
-    };
-    render(&mut renderer, &scene, &settings).expect("it draws");
-    let found = read_texels(&renderer, Channel::Diffuse);
+    let camera = Camera { position: Vec3::ZERO, target: Vec3::Z, up: Vec3::Y, fov_degrees: 20.0 };
+    let found = diffuse(bounce, &head, &[], albedo, lamp, camera)?;
     Some([0, 1, 2].map(|c| found.iter().map(|p| p[c]).sum::<f32>() / found.len() as f32))
 }
 
