@@ -19,6 +19,7 @@
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
+use std::fmt::Write as _;
 use std::path::Path;
 
 use glam::{Vec2, Vec3};
@@ -315,12 +316,16 @@ impl<'a> Reader<'a> {
 
     fn face(&mut self, line: usize, rest: &[u8]) -> Result<(), ImportError> {
         let rest = String::from_utf8_lossy(rest);
-        let words: Vec<&str> = rest.split_ascii_whitespace().collect();
-        if words.len() < 3 {
+        let words = rest.split_ascii_whitespace();
+        let corners = words.clone().count();
+        if corners < 3 {
             self.notes.add("faces of fewer than 3 corners are left out", format!("line {line}"));
             return Ok(());
         }
-        if words.len() > MOST_CORNERS {
+        // Faces of four corners around each point, and as many again.
+        let all = self.without_uv.len() + corners;
+        self.within(line, "corners of faces", all, 8 * Limits::of_process().vertices())?;
+        if corners > MOST_CORNERS {
             let message =
                 format!("faces of more than {MOST_CORNERS} corners are right only where they are convex");
             self.notes.add(message, format!("line {line}"));
@@ -354,10 +359,10 @@ impl<'a> Reader<'a> {
             }
             let [point, uv] = texts;
             self.without_uv.push(uv == 0);
-            self.faces.push_str(&if uv == 0 { format!(" {point}") } else { format!(" {point}/{uv}") });
+            let written =
+                if uv == 0 { write!(self.faces, " {point}") } else { write!(self.faces, " {point}/{uv}") };
+            written.expect("a string takes all that fits the memory");
         }
-        // Faces of four corners around each point, and as many again.
-        self.within(line, "corners of faces", self.without_uv.len(), 8 * Limits::of_process().vertices())?;
         self.faces.push('\n');
         self.given_faces.push(Given { line, end: self.faces.len() });
         self.faces_without_uv += usize::from(self.without_uv[first..].contains(&true));
