@@ -225,7 +225,8 @@ fn mesh(head: &Head, shot: &Shot) -> Vec<u8> {
         let (kind, color) = match part.material {
             Material::Skin => (0, None),
             Material::Eye => (1, Some(Vec3::new(0.5, 0.42, 0.34))),
-            Material::Teeth => (2, Some(Vec3::new(0.66, 0.57, 0.45))),
+            // The mean of the enamel that rubor draws, by the light of both in one shader.
+            Material::Teeth => (2, Some(Vec3::new(0.69, 0.61, 0.485))),
             Material::Gums => (3, Some(Vec3::new(0.374, 0.135, 0.125))),
             _ => (3, Some(Vec3::new(0.36, 0.105, 0.095))),
         };
