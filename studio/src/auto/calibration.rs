@@ -203,6 +203,9 @@ pub struct Calibration {
     relative_rmse: Together,
 }
 
+/// Term of the logarithm of millimetres across a pixel.
+const DISTANCE: usize = 1;
+
 fn terms(f: &Features) -> [f64; TERMS] {
     let s = f.mm_per_pixel.max(1e-4).ln();
     let [relief, brightness] = [f.relief.max(1e-3).ln(), f.brightness.max(1e-2).ln()];
@@ -401,7 +404,9 @@ impl Calibration {
                     seen[i].clamp(self.range[i][0], self.range[i][1].max(self.range[i][0]))
                 });
                 let mean = (group.drive.of(f) * dot(&e.coefficients, &known).exp()).min(1.0);
-                Expected { mean, margin: (mean * e.margin.exp_m1()).min(1.0) }
+                // A head that is further away than those of the shots is known less well.
+                let beyond = (seen[DISTANCE] - known[DISTANCE]).max(0.0);
+                Expected { mean, margin: (mean * (e.margin + beyond).exp_m1()).min(1.0) }
             }
             _ => Expected::default(),
         }

@@ -299,6 +299,8 @@ impl Auto {
         let parts = self.parts(heads, size);
         let estimate = |choices: Vec<Option<usize>>| self.estimate(choices, base_ms, &parts);
         let mut all: Vec<Chosen> = self.combinations().into_iter().map(estimate).collect();
+        // The last choices of all groups.
+        let exact = all.last().cloned();
         all.sort_by(|a, b| {
             a.milliseconds.total_cmp(&b.milliseconds).then(self.error(a).total_cmp(&self.error(b)))
         });
@@ -309,7 +311,7 @@ impl Auto {
             least = least.min(self.error(c));
             is_nearer
         });
-        let [Some(fastest), Some(nearest)] = [all.first(), all.last()] else { return estimate(Vec::new()) };
+        let (Some(fastest), Some(exact)) = (all.first(), exact) else { return estimate(Vec::new()) };
         let under = |share: f64| match self.bound {
             Bound::Flip(most) | Bound::RelativeRmse(most) => {
                 all.iter().find(|c| self.error(c) <= share * most)
@@ -318,7 +320,8 @@ impl Auto {
         };
         let stays = before.map(|b| estimate(b.choices.clone())).filter(|c| c.is_kept);
         let Some(stays) = stays else {
-            let none = if matches!(self.bound, Bound::Milliseconds(_)) { fastest } else { nearest };
+            // Where no choice is expected to keep a bound of error, the differences of their estimates say too little.
+            let none = if matches!(self.bound, Bound::Milliseconds(_)) { fastest } else { &exact };
             return under(1.0).unwrap_or(none).clone();
         };
         let is_better = |c: &&Chosen| match self.bound {
@@ -410,6 +413,19 @@ mod tests {
         assert!(loose.is_kept && loose.relative_rmse <= 0.5);
         let never = auto(Bound::Milliseconds(1e-6)).choose(&[NEAR], size, None);
         assert!(!never.is_kept);
+        // Where nothing keeps a bound of error, the last choice of every group.
+        let auto = auto(Bound::Flip(1e-6));
+        let exact: Vec<_> = auto.calibration.groups.iter().map(|g| Some(g.choices.len() - 1)).collect();
+        let never = auto.choose(&[NEAR], size, None);
+        assert!(!never.is_kept && never.choices == exact, "{never:?}");
+    }
+
+    #[test]
+    fn a_head_beyond_the_shots_has_wider_margins() {
+        let calibration = Calibration::shipped().unwrap();
+        let error = |mm_per_pixel| calibration.error(Metric::Flip, 0, 0, &Features { mm_per_pixel, ..NEAR });
+        let (far, further) = (error(20.0), error(60.0));
+        assert!(far.mean == further.mean && far.margin < further.margin, "{far:?} {further:?}");
     }
 
     #[test]

@@ -40,9 +40,9 @@ pub(crate) struct Arguments {
     /// Timed frames of a choice in a scene and a round; 0 times nothing [default: 20; 2 for quick]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=10_000))]
     frames: Option<u32>,
-    /// Rounds in which all choices take turns
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
-    rounds: u32,
+    /// Rounds in which all choices take turns [default: 3; 2 for quick]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
+    rounds: Option<u32>,
     /// Graphics adapter: its number or a part of its name (see `rubor adapters`)
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -98,6 +98,12 @@ pub(crate) struct Arguments {
     settings: SettingsFlags<Charting>,
 }
 
+impl Arguments {
+    fn rounds(&self, is_quick: bool) -> u32 {
+        self.rounds.unwrap_or(if is_quick { 2 } else { 3 })
+    }
+}
+
 #[derive(Clone, Debug)]
 struct Charting;
 impl Purpose for Charting {
@@ -144,7 +150,11 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         return calibrate(arguments, &mut studio, &loaded.head, &rig, &base, is_quick);
     }
     if arguments.auto {
-        return judge(arguments, &mut studio, &loaded.head, &rig, (&base, held), suite);
+        let timing = experiment::Timing {
+            rounds: arguments.rounds(is_quick),
+            frames: arguments.frames.unwrap_or(5).max(1),
+        };
+        return judge(arguments, &mut studio, &loaded.head, &rig, (&base, held), suite, timing);
     }
     let groups = chart::groups(suite, &base, &listed, &held, effort)?;
     let frames = arguments.frames.unwrap_or(frames);
@@ -176,7 +186,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         console::notes(&notes);
         scenes = found;
     }
-    let timing = timing(arguments.rounds, frames);
+    let timing = timing(arguments.rounds(is_quick), frames);
     let options = Options {
         timing: Some(timing).filter(|t| t.frames > 0),
         folder: arguments.output.clone(),
@@ -306,7 +316,7 @@ fn calibrate(
     let options = measured::Options {
         shots: arguments.shots.unwrap_or(shots) as usize,
         samples: arguments.samples.unwrap_or(samples),
-        timing: timing(arguments.rounds, arguments.frames.unwrap_or(frames)),
+        timing: timing(arguments.rounds(is_quick), arguments.frames.unwrap_or(frames)),
         large: if is_quick { [256, 256] } else { [1280, 720] },
     };
     let mut progress = Progress::default();
@@ -346,6 +356,7 @@ fn judge(
     rig: &Rig,
     (base, held): (&Settings, Vec<String>),
     suite: Suite,
+    timing: experiment::Timing,
 ) -> Outcome {
     let (mut scenes, mut notes) = (Vec::new(), Vec::new());
     for path in &arguments.sequence {
@@ -365,8 +376,6 @@ fn judge(
     let (calibration, notes) = Calibration::of_devices([name.as_str()])?;
     console::notes(&notes);
     let auto = Auto { bound: Bound::Flip(1.0), held, calibration };
-    let timing =
-        experiment::Timing { rounds: arguments.rounds, frames: arguments.frames.unwrap_or(5).max(1) };
     studio.set_heads(std::iter::repeat_n(head, usize::from(arguments.heads)))?;
     let mut progress = Progress::default();
     let measured = experiment::measured(studio, head, base, &scenes, &auto, timing, &mut progress);

@@ -47,6 +47,28 @@ fn head(material: Material, flaps: &[[Vec3; 2]]) -> Head {
     Head { name: "flap".into(), mesh, ..Head::default() }
 }
 
+/// A ridge of teeth along Y whose sides fall off by 45 degrees, in four triangles, and a flap of skin close to its right side.
+fn ridge(flap: Option<[Vec3; 2]>) -> Head {
+    let mut head = head(Material::Teeth, flap.as_slice());
+    let [left, right] = [-30.0, 30.0].map(|x: f32| 0.001 * Vec3::new(x, 0.0, -x.abs()));
+    for (point, foot) in head.mesh.points[..4].iter_mut().zip([left, right, right, left]) {
+        *point = foot + point.y * Vec3::Y;
+    }
+    // The square becomes two that share the points of the ridge.
+    let top = head.mesh.points.len() as u32;
+    head.mesh.points.extend([-0.03, 0.03].map(|y| y * Vec3::Y));
+    let first = head.mesh.vertices.len() as u32;
+    head.mesh.vertices.extend([top, top + 1].map(|point| Vertex { point, uv: Vec2::new(0.04, 0.55) }));
+    let flaps = head.mesh.triangles.split_off(2);
+    head.mesh.triangles =
+        vec![[0, first, first + 1], [0, first + 1, 3], [first, 1, 2], [first, 2, first + 1]];
+    head.mesh.triangles.extend(flaps);
+    for (part, triangles) in head.mesh.parts.iter_mut().zip([0..4, 4..6]) {
+        part.triangles = triangles;
+    }
+    head
+}
+
 /// Green light of the picture in front of a head, by a lamp or an even sky.
 fn light_on(renderer: &mut Renderer, head: &Head, by_sky: bool) -> Vec<f32> {
     let sky = EnvironmentMap::from_fn(16, 8, |_| Vec3::ONE).upload(renderer.gpu());
@@ -108,6 +130,23 @@ fn light_spreads_in_teeth_and_not_in_what_is_opaque() {
     assert!((1.0..2.6).contains(&soft_mm), "a disc of 1.3 mm about each place: {soft_mm} mm");
     // The shadow lies where it did.
     assert!((hard_at - 3.0).abs() < 0.25 && (soft_at - hard_at).abs() < 0.35, "{hard_at} and {soft_at}");
+}
+
+#[test]
+fn what_is_close_to_a_bent_crown_shades_it() {
+    let Some(mut renderer) = renderer() else { return };
+    // The lamp stands straight over the right side, whose tangent plane at the ridge passes in front of the flap.
+    let flap = [Vec3::new(3.6, -30.0, -2.2), Vec3::new(30.0, 30.0, -2.2)];
+    let mut light = |flap| {
+        let picture = light_on(&mut renderer, &ridge(flap), false);
+        let pixel = |mm: f32| ((mm / SEEN_MM + 0.5) * SIZE as f32) as usize;
+        let row = (SIZE / 2 * SIZE) as usize;
+        [pixel(1.0), pixel(3.4)].map(|x| picture[row + x])
+    };
+    let ([open, open_beside], [lit, shaded]) = (light(None), light(Some(flap)));
+    assert!(lit > 0.98 * open, "{lit} of {open}");
+    // The flap hides the lamp from x = 2.9 mm on, and light spreads from there.
+    assert!(shaded < 0.3 * open_beside, "{shaded} of {open_beside}");
 }
 
 #[test]
