@@ -25,7 +25,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 pub use calibration::Calibration;
-use calibration::{Expected, Metric};
+use calibration::{Expected, Group, Metric};
 pub use features::{Features, Outline, features_of};
 pub use shots::{CALIBRATED, unseen_shots};
 
@@ -261,6 +261,20 @@ impl Auto {
         groups.map(|(g, group)| (0..group.choices.len()).map(|c| part(g, c)).collect()).collect()
     }
 
+    /// The last choice of each group, or the cheapest where none makes a difference.
+    fn most_exact(&self, parts: &[Vec<Part>]) -> Vec<Option<usize>> {
+        let of = |(group, parts): (&Group, &Vec<Part>)| {
+            if self.held.contains(&group.flag) {
+                return None;
+            }
+            let is_free = |part: &Part| part.flip.mean == 0.0 && part.relative_rmse.mean == 0.0;
+            let free = parts.iter().enumerate().filter(|(_, part)| is_free(part));
+            let cheapest = free.min_by(|(_, a), (_, b)| a.milliseconds.total_cmp(&b.milliseconds));
+            cheapest.map(|(i, _)| i).or(parts.len().checked_sub(1))
+        };
+        self.calibration.groups.iter().zip(parts).map(of).collect()
+    }
+
     /// Error and time of some choices, from those of each.
     fn estimate(&self, choices: Vec<Option<usize>>, base_ms: f64, parts: &[Vec<Part>]) -> Chosen {
         let made: Vec<&Part> =
@@ -299,8 +313,7 @@ impl Auto {
         let parts = self.parts(heads, size);
         let estimate = |choices: Vec<Option<usize>>| self.estimate(choices, base_ms, &parts);
         let mut all: Vec<Chosen> = self.combinations().into_iter().map(estimate).collect();
-        // The last choices of all groups.
-        let exact = all.last().cloned();
+        let exact = estimate(self.most_exact(&parts));
         all.sort_by(|a, b| {
             a.milliseconds.total_cmp(&b.milliseconds).then(self.error(a).total_cmp(&self.error(b)))
         });
@@ -311,7 +324,7 @@ impl Auto {
             least = least.min(self.error(c));
             is_nearer
         });
-        let (Some(fastest), Some(exact)) = (all.first(), exact) else { return estimate(Vec::new()) };
+        let Some(fastest) = all.first() else { return exact };
         let under = |share: f64| match self.bound {
             Bound::Flip(most) | Bound::RelativeRmse(most) => {
                 all.iter().find(|c| self.error(c) <= share * most)
@@ -320,9 +333,12 @@ impl Auto {
         };
         let stays = before.map(|b| estimate(b.choices.clone())).filter(|c| c.is_kept);
         let Some(stays) = stays else {
+            if matches!(self.bound, Bound::Milliseconds(_)) {
+                return under(1.0).unwrap_or(fastest).clone();
+            }
             // Where no choice is expected to keep a bound of error, the differences of their estimates say too little.
-            let none = if matches!(self.bound, Bound::Milliseconds(_)) { fastest } else { &exact };
-            return under(1.0).unwrap_or(none).clone();
+            let is_exact = before.is_some_and(|b| b.choices == exact.choices);
+            return under(if is_exact { HYSTERESIS } else { 1.0 }).cloned().unwrap_or(exact);
         };
         let is_better = |c: &&Chosen| match self.bound {
             Bound::Flip(_) | Bound::RelativeRmse(_) => c.milliseconds < stays.milliseconds,
@@ -416,7 +432,7 @@ mod tests {
         // Where nothing keeps a bound of error, the last choice of every group.
         let auto = auto(Bound::Flip(1e-6));
         let exact: Vec<_> = auto.calibration.groups.iter().map(|g| Some(g.choices.len() - 1)).collect();
-        let never = auto.choose(&[NEAR], size, None);
+        let never = auto.choose(&[Features { wrinkles: 1.0, blood: 1.0, ..NEAR }], size, None);
         assert!(!never.is_kept && never.choices == exact, "{never:?}");
     }
 
@@ -448,6 +464,7 @@ mod tests {
         let (mut changes, mut free) = (0, 0);
         let mut left: Vec<(i32, Vec<Option<usize>>)> = Vec::new();
         let mut last_free: Option<Chosen> = None;
+        let exact = Auto { bound: Bound::Flip(1e-9), ..auto.clone() }.choose(&[NEAR], size, None).choices;
         for i in 0..400 {
             // A slow zoom with a tremble.
             let tremble = if i % 2 == 0 { 1.04 } else { 1.0 };
@@ -462,7 +479,8 @@ mod tests {
                 left.push((i, before.choices.clone()));
             }
             free += usize::from(last_free.as_ref().is_some_and(|b| b.choices != alone.choices));
-            assert!(chosen.is_kept || !alone.is_kept, "the bound comes first");
+            let comes_first = chosen.is_kept || !alone.is_kept || chosen.choices == exact;
+            assert!(comes_first, "the bound comes first");
             (before, last_free) = (Some(chosen), Some(alone));
         }
         assert!(3 * changes < free, "{changes} changes, {free} without memory");
